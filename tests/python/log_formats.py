@@ -1,5 +1,6 @@
 """What the tests of log formats share: channels of two rates, and what has to come out."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,3 +58,23 @@ def table() -> Columns:
     columns = {"time_s": FAST, **measured(FAST)}
     columns["Speed"] = np.where(np.arange(FAST.size) % 5 == 0, columns["Speed"], np.nan)
     return columns
+
+
+SI: dict[str, Any] = {c: {"column": n, "factor": FACTORS.get(c, 1.0)} for c, n in MAP.items()}
+TIMED = {**SI, "time_s": "Time"}
+NAMES = ["Time", *UNITS]
+
+
+def cells(missing: str | None = None) -> list[list[str]]:
+    """Rows of cells; with `missing`, four of five of the speed are that word."""
+    rows = [[f"{t:.2f}", *(f"{measured(t)[n]:.9f}" for n in UNITS)] for t in FAST]
+    for k, row in enumerate(rows):
+        if missing is not None and k % 5:
+            row[NAMES.index("Speed")] = missing
+    return rows
+
+
+def write(folder: Path, *lines: str) -> Path:
+    path = folder / "run.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path

@@ -7,6 +7,7 @@ from .columns import Columns, as_floats, listed, named_columns
 from .held import held_rows
 from .laws.laws import Contradiction
 from .log import Log, Retimed
+from .signals import standing
 from .stamps import as_seconds, seconds_of_stamps
 from .together import check_excitation, copies, several_logs, unexcited
 
@@ -29,6 +30,7 @@ __all__ = [
     "named_columns",
     "seconds_of_stamps",
     "several_logs",
+    "standing",
     "times_wheelbase",
     "unexcited",
 ]

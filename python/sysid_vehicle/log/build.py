@@ -18,6 +18,7 @@ from .held import blank_held
 from .laws.plausibility import check_coherence
 from .laws.ranges import dropouts
 from .signals import fill_short_gaps, spikes
+from .standing import blank_standing
 
 LEAST_STRETCH_S = 1.0
 """Driving without a break that is used at least [s]."""
@@ -76,6 +77,7 @@ def _build(
         time_s = time_s - time_s[0]
     if check:
         columns = blank_held(columns, 1.0 / float(np.median(np.diff(time_s))), notes)
+        columns = blank_standing(columns, time_s, notes)
     notes += checks.nan_block_notes(time_s, columns)
     for channel in despike:
         if channel not in columns:

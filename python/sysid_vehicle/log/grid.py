@@ -19,6 +19,8 @@ _FINER = ((400.0, "milli", "0.001"), (4e5, "micro", "1e-6"), (np.inf, "nano", "1
 _SHORTEST_S = 1e-5  # no car is logged at 100 kHz: 0.5 s is more than that in days
 _MIN_STEP = 1e-6  # of the usual step: below, two rows are one that was written twice
 _OWN_GAP = 1.5  # a channel is interpolated between samples that are no farther apart, in periods
+# What times are written in: decimals, or the bits that numbers of 32 bits have after hours.
+_QUANTA = (*(10.0**-k for k in range(2, 7)), *(2.0**-k for k in range(4, 16)))
 _BEATS = 5  # longer steps, evenly spaced, that show a step of no whole number of decimals
 _MAX_GROWTH = 20  # a grid this many times longer than the log means a broken time channel
 
@@ -189,9 +191,8 @@ def is_slow(period: float, dt: float) -> bool:
 
 
 def _is_rounded(time_s: FloatArray, mean_step: float) -> bool:
-    """Tell whether uneven steps come only from writing an even time with few decimals."""
-    for decimals in range(2, 7):
-        quantum = 10.0**-decimals
+    """Tell whether uneven steps come only from writing an even time with few decimals, or bits."""
+    for quantum in _QUANTA:
         ticks = time_s / quantum
         if np.abs(ticks - np.round(ticks)).max() < 1e-3:
             steps = np.diff(np.round(ticks))

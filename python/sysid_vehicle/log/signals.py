@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from .._common.arrays import NORMAL_MAD, FloatArray, filled
@@ -12,6 +14,9 @@ _SPIKE_NOISE, _SPIKE_QUANTA, _SPIKE_RANGE = 8.0, 3.0, 0.05
 _SPIKE_NEIGHBOURS = 0.3  # the neighbours of a spike differ by less than this part of it
 _SPIKE_APPROACH = 3.0  # and it exceeds by this factor the steps just before and just after
 _SPIKE_WINDOW = 51
+# A sensor that drops out stands at one value, which it jumps to and from this many times as far as
+# it steps anywhere else; of all samples these are at most that share.
+_STANDS_JUMP, _STANDS_SHARE = 5.0, 0.05
 # Speeds at which the model is run, and the share of its usual top speed for a slow car.
 _LEAST_MPS, _LEAST_ANY_MPS, _LEAST_SHARE = 3.0, 1.0, 0.4
 
@@ -97,6 +102,48 @@ def spikes(values: FloatArray) -> np.ndarray:
     second = np.pad(np.abs(np.diff(x, 2)), 1, mode="edge")
     noise = _local_median(second, candidates)
     return candidates[deviation[candidates] > _SPIKE_NOISE * noise]
+
+
+def standing(values: FloatArray, fewest: int = 3) -> np.ndarray:
+    """Return the samples at which a channel stands at a value that it jumps to and from.
+
+    So reads a sensor that drops out: zero, its last value, or one that says "not available". Both
+    jumps, in opposite directions, are far longer than any other step of the channel, and each is
+    one step: what moves there and back quickly, such as a steering robot, does it in several.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        NaN is missing.
+    fewest : int
+        Samples that stand together at least.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+        Sorted.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    none = np.empty(0, dtype=np.intp)
+    step = np.diff(values[known])
+    size = np.abs(step)
+    tail = np.sort(size[size > 0.0])[-max(3, round(_STANDS_SHARE * size.size)) :]
+    ratio = tail[1:] / tail[:-1] if tail.size > 1 else tail[:0]
+    if ratio.size == 0 or ratio.max() < _STANDS_JUMP:
+        return none
+    jump = np.where(size >= tail[1 + int(np.argmax(ratio))], np.sign(step), 0.0)
+    jumps = np.flatnonzero(jump)
+    before, after = np.roll(jump, 1), np.roll(jump, -1)
+    found = [
+        known[a + 1 : b + 1]
+        for a, b in pairwise(jumps)
+        if b - a >= fewest
+        and jump[b] == -jump[a] != before[a]
+        and after[b] != jump[b]
+        and not step[a + 1 : b].any()
+    ]
+    stands = np.concatenate([none, *found])
+    return stands if stands.size <= _STANDS_SHARE * known.size else none
 
 
 def disorder(values: FloatArray) -> float:

@@ -218,7 +218,7 @@ def cornering_stiffness(
     Warns
     -----
     SysidWarning
-        If too few samples hold slip.
+        If too few samples hold slip, or the result is negative.
     """
     beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if beta_rad is None else as_float64(beta_rad)
     if beta.shape != (log.n,):
@@ -258,6 +258,14 @@ def cornering_stiffness(
             f"the cornering stiffness stays near where it started. Give a log with gentle corners "
             f"in which no channel is missing for long"
         )
+    for axle, c, std in (("front", cf, cf_std), ("rear", cr, cr_std)):
+        if run.excited and c[-1] <= 0.0:
+            warn(
+                f"{log.name}: the {axle} cornering stiffness is {c[-1] / 1e3:.3g} +- "
+                f"{std[-1] / 1e3:.2g} kN/rad at sample {log.n - 1}, which no tyre has: check signs "
+                f"and places of steer_rad, vy_mps, yaw_rate_radps and ay_mps2; at a few m/s slip "
+                f"angles are noise"
+            )
     return run
 
 

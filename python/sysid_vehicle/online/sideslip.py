@@ -198,6 +198,11 @@ def estimate_sideslip(
         If a channel is absent or the kind is not known.
     NumericalError
         If the filter leaves the range of numbers; the message gives the sample.
+
+    Warns
+    -----
+    SysidWarning
+        If the car is too slow for the observer all the time.
     """
     settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
     return run_over(log, SideslipObserver(vehicle, settings, kind), settings)
@@ -208,6 +213,13 @@ def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -
     sensors = np.column_stack([log[name] for name in _SENSORS])
     dt = np.full(log.n, 1.0 / log.rate_hz)
     found = SideslipEstimate._make(observer.run(dt, sensors).T)
+    if (np.asarray(found.mode) == 1).all():
+        warn(
+            f"{log.name}: vx_mps: reaches {np.nanmax(log['vx_mps']):.3g} m/s, and the observer "
+            f"runs from {settings['go_above_mps']:.3g} m/s on: no sideslip was estimated. Give a "
+            f"log of driving forwards, check unit and sign of the speed, or lower stop_below_mps "
+            f"and go_above_mps of the settings"
+        )
     true_beta = true_std = None
     if log.has("vy_mps"):
         true_beta = np.arctan2(log["vy_mps"], log["vx_mps"])

@@ -237,7 +237,10 @@ class SideslipRun(Told):
                 linewidth=0,
             )  # fmt: skip
             ax.plot(self.time_s, c / 1e3, color=color, linewidth=1.0, label=name)
-        ax.set_ylim(0.0, 2.0 * float(np.nanmax([self.cf_npr[-1], self.cr_npr[-1]])) / 1e3)
+        both = np.stack([self.cf_npr, self.cr_npr])
+        known = both[:, np.isfinite(both).all(axis=0)]  # not where the car stands
+        if known.size:
+            ax.set_ylim(0.0, 2.0 * float(known[:, -1].max()) / 1e3)
         ax.legend(frameon=False)
         return tidy(ax, xlabel="time [s]", ylabel="cornering stiffness [kN/rad]")
 

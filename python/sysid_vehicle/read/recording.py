@@ -147,6 +147,7 @@ class Recording:
         empty = [name for name in used if signals[name].time_s.size == 0]
         if empty:
             raise InvalidInput(f"{empty[0]}: holds no sample; map another channel, or record it")
+        _refuse_apart({name: signals[name].time_s for name in used})
         time_s, rows = common_rows({name: signals[name].time_s for name in used})
         columns = {
             name: _spread(signal.values, rows[name], time_s.size)
@@ -180,6 +181,18 @@ class Recording:
             if np.array_equal(signal.time_s, signals[other].time_s):
                 result[name] = other, signal.values
         return result
+
+
+def _refuse_apart(times: Mapping[str, FloatArray]) -> None:
+    """Refuse channels of which one ends before another begins: their clocks are others."""
+    first = min(times, key=lambda name: times[name][-1])
+    last = max(times, key=lambda name: times[name][0])
+    if times[last][0] - times[first][-1] > _LATE_S:
+        raise InvalidInput(
+            f"{first} and {last}: were never recorded together: the first ends at "
+            f"{times[first][-1]:.6g} s, the other begins at {times[last][0]:.6g} s; map channels "
+            f"of one clock, or give read_log pairs of times and values on a common one"
+        )
 
 
 def last_part(name: str) -> str:

@@ -5,7 +5,7 @@ Dettu et al. (2023), eqs. (1) to (5). On the built-in twin the whole loop runs i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -23,7 +23,7 @@ from .drives import INPUTS, OUTPUTS, WHEELS
 from .failing import check_start
 from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, place_of
 from .readings import READINGS, Readings
-from .residuals import ChannelResidual, contradictions, residual_of
+from .residuals import ChannelResidual, Shown, contradictions, residual_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -288,7 +288,11 @@ def observe(
         {name: outputs[:, i] for i, name in enumerate(OUTPUTS)},
         np.asarray(stages, dtype=np.float64),
         spread,
-        {name: values[::stride, i] for i, name in enumerate(READINGS)},
+        Shown(
+            {name: values[::stride, i] for i, name in enumerate(READINGS)},
+            {name: outputs[:, i] for i, name in enumerate(OUTPUTS)},
+            stride * dt,
+        ),
     )
 
 
@@ -300,7 +304,7 @@ def judged(
     outputs: dict[str, FloatArray],
     stages: FloatArray,
     spread: Sequence[float],
-    car: Mapping[str, FloatArray],
+    shown: Shown,
 ) -> Observation:
     """An observation with what its residuals say of it; a warning where they contradict it.
 
@@ -314,8 +318,8 @@ def judged(
         As `Observation` has them.
     spread : sequence of float
         Of the batch's unknowns, in parts of their first spread.
-    car : mapping of str to ndarray, shape (m,)
-        Readings at the recorded times.
+    shown : Shown
+        What is judged: readings of car and twin, at the recorded times or at more of them.
     """
     batch = observer.batch
     unknown = () if batch is None else batch.looked_for(inputs)
@@ -326,12 +330,10 @@ def judged(
     if batch is not None:
         noise.update(batch.channels)
         filtered = {name for name, hz in batch.high_pass_hz.items() if hz > 0.0}
-    step = float(time_s[1]) if len(time_s) > 1 else 1.0
     residuals = tuple(
         found
         for name, told in noise.items()
-        if name not in filtered
-        and (found := residual_of(name, car[name], outputs[name], told, step)) is not None
+        if name not in filtered and (found := residual_of(name, shown, told)) is not None
     )
     limits = {law.parameter: (law.lower, law.upper) for law in laws}
     limits.update({u.parameter: (u.lower, u.upper) for u in estimated})

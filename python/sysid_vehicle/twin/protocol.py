@@ -26,6 +26,7 @@ from .car import LOAD_NAMES
 from .checks import checked_rows, checked_step
 from .failing import all_numbers, blamed_on, check_repeats, check_start
 from .observer import Observation, Observer, judged
+from .residuals import Shown
 
 CAPABILITIES = ("parameters", "state", "wrench", "snapshot", "clone")
 _MOST_PARAMETERS = len(LOAD_NAMES)
@@ -135,9 +136,11 @@ def observe_with(
     several = _Several(twin, observer, dt)
     check_start(observer.limits, dict(zip(names, several.estimate, strict=False)))
     kept: list[tuple[list[float], FloatArray, int]] = []
+    shown = np.empty((n, len(twin.output_names)))
     for k in range(n):
         with blamed_on(several, k, dt):
             outputs = several.outputs(inputs[k])
+            shown[k] = outputs[0]
             if k % stride == 0:
                 kept.append((list(several.estimate), outputs[0], several.stage))
             several.learn(read[k], outputs)
@@ -152,7 +155,11 @@ def observe_with(
         {name: seen[:, i] for i, name in enumerate(twin.output_names)},
         np.array([float(row[2]) for row in kept]),
         several.spread,
-        {name: read[::stride, i] for i, name in enumerate(twin.output_names)},
+        Shown(
+            {name: read[:, i] for i, name in enumerate(twin.output_names)},
+            {name: shown[:, i] for i, name in enumerate(twin.output_names)},
+            dt,
+        ),
     )
 
 

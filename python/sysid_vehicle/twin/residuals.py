@@ -46,8 +46,8 @@ class ChannelResidual:
         standard deviation.
     offset, offset_std : float
         Mean of the residual and its standard deviation.
-    twin_std : float
-        Standard deviation of the twin's own reading.
+    twin_std, car_std : float
+        Standard deviations of what the twin and the car read.
     largest_correlation : float
         Of the residual with itself, up to a second later.
     white : bool
@@ -62,11 +62,18 @@ class ChannelResidual:
     offset: float
     offset_std: float
     twin_std: float
+    car_std: float
     largest_correlation: float
     white: bool
 
     def contradiction(self) -> str | None:
         """How it contradicts that car and twin go together, if it does."""
+        moved = np.isfinite(self.noise) and self.car_std > _SIGNIFICANT * self.noise
+        if moved and self.twin_std < _FOLLOWS * self.car_std:
+            return (
+                f"{self.channel}: the car's reading moves by {self.car_std:.3g}, the twin's by "
+                f"{self.twin_std:.3g}; check the units of the inputs and of the channel"
+            )
         away = abs(self.follows - 1.0)
         if away > _FOLLOWS and away > _SIGNIFICANT * self.follows_std:
             return (
@@ -91,22 +98,36 @@ class ChannelResidual:
         )
 
 
-def residual_of(
-    channel: str, car: FloatArray, twin: FloatArray, noise: float, step_s: float
-) -> ChannelResidual | None:
+@dataclass(frozen=True)
+class Shown:
+    """What car and twin read at the same times.
+
+    Attributes
+    ----------
+    car, twin : mapping of str to ndarray, shape (n,)
+        By channel; NaN where the car has no reading.
+    step_s : float
+        Between two samples.
+    """
+
+    car: Mapping[str, FloatArray]
+    twin: Mapping[str, FloatArray]
+    step_s: float
+
+
+def residual_of(channel: str, shown: Shown, noise: float) -> ChannelResidual | None:
     """Judge a channel by its second half; None where too little was read or nothing moves.
 
     Parameters
     ----------
     channel : str
         Its name.
-    car, twin : ndarray, shape (n,)
-        Readings at the recorded times, NaN where the car has none.
+    shown : Shown
+        What car and twin read.
     noise : float
         Standard deviation as told, or NaN.
-    step_s : float
-        Between recorded times.
     """
+    car, twin = shown.car[channel], shown.twin[channel]
     half = slice(len(car) // 2, None)
     y, s = car[half], twin[half]
     there = np.isfinite(y) & np.isfinite(s)
@@ -122,7 +143,7 @@ def residual_of(
     follows = float(np.sum(own[there] * (y[there] - np.mean(y[there]))) / power)
     left = np.where(there, e - offset, 0.0)
     score = own * np.where(there, left - (follows - 1.0) * own, 0.0)
-    correlation, white = _colour(left, there, step_s)
+    correlation, white = _colour(left, there, shown.step_s)
     return ChannelResidual(
         channel,
         float(np.sqrt(np.mean(e[there] ** 2))),
@@ -132,6 +153,7 @@ def residual_of(
         offset,
         _scatter(left) / count,
         float(np.sqrt(power / count)),
+        float(np.std(y[there])),
         correlation,
         white,
     )

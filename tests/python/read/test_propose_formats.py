@@ -87,3 +87,57 @@ def test_a_raw_log_is_read_with_the_map_that_is_proposed(
         near = 0.08 if channel == "steer_rad" else 1e-3  # the gear follows from the wheelbase
         scale = float(np.std(found[channel]) / np.std(log[channel]))
         assert scale == pytest.approx(1.0, abs=near), channel
+
+
+@pytest.mark.parametrize(
+    ("channel", "name"),
+    [
+        ("steer_rad", "SAS_Angle"),
+        ("steer_rad", "LWS_ANGLE"),
+        ("steer_rad", "LWI_Lenkradwinkel"),
+        ("vx_mps", "ESP_v_Signal"),
+        ("vx_mps", "Wheel-Based Vehicle Speed"),
+        ("vx_mps", "VelForward"),
+        ("vx_mps", "Ux_mps"),
+        ("yaw_rate_radps", "AngRateDown"),
+        ("yaw_rate_radps", "Rate_Body_Z"),
+        ("yaw_rate_radps", "/vehicle/status/velocity_status/heading_rate"),
+        ("yaw_rate_radps", "r"),
+        ("ay_mps2", "Acc_Hor_Y"),
+        ("ay_mps2", "aLat"),
+        ("ay_mps2", "ayCG_mps2"),
+        ("yaw_rate_radps", "dpsi_radps"),
+        ("steer_rad", "deltawheel_rad"),
+        ("ax_mps2", "AccelForward"),
+        ("ax_mps2", "Lon Acc"),
+    ],
+)
+def test_names_of_databases_and_navigation(log: sv.Log, channel: str, name: str) -> None:
+    columns = {c: log[c] for c in ("time_s", *SIGNALS) if c != channel} | {name: log[channel]}
+    assert sv.propose_channels(columns).channels[channel].column == name
+
+
+def test_the_only_stamps_are_the_time(log: sv.Log, tmp_path: Path) -> None:
+    """Whatever their column is called."""
+    begin = np.datetime64("2026-11-27T10:00:00", "ns")
+    stamps = begin + np.round(log["time_s"] * 1e9).astype("timedelta64[ns]")
+    columns = {"aufgezeichnet": stamps, **{c: log[c] for c in SIGNALS}}
+    found = sv.propose_channels(columns)
+    assert found.channels["time_s"].column == "aufgezeichnet"
+    read = sv.read_log(columns, found.channel_map)
+    np.testing.assert_allclose(read["vx_mps"], log["vx_mps"])
+
+
+@pytest.mark.parametrize("fill", [0.0, np.nan])
+@pytest.mark.parametrize("channel", ["vy_mps", "yaw_rate_radps", "ay_mps2", "steer_rad", "vx_mps"])
+def test_a_column_that_is_filled_with_one_number(log: sv.Log, channel: str, fill: float) -> None:
+    """Loggers write zeros, or nothing, for what is not connected."""
+    columns = {c: np.array(log[c]) for c in log.channels} | {channel: np.full(log.n, fill)}
+    found = sv.propose_channels(columns)
+    assert found.channels[channel].column == channel
+    assert found.channels["ax_mps2"].factor == 1.0
+
+
+def test_a_car_that_stands(log: sv.Log) -> None:
+    columns = {c: np.zeros(log.n) for c in log.channels} | {"time_s": log["time_s"]}
+    assert set(sv.propose_channels(columns).channels) == set(log.channels)

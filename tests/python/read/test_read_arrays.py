@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from log_formats import FACTORS, FAST, MAP, UNITS, check_values, measured, read_told
+from log_formats import FACTORS, FAST, MAP, SLOW, UNITS, check_values, measured, read_told
 from scipy.io import savemat
 
-from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.read import read_log
 
 SI: dict[str, Any] = {c: {"column": n, "factor": FACTORS.get(c, 1.0)} for c, n in MAP.items()}
@@ -113,3 +113,59 @@ def test_arrays_of_one_column_or_row(shape: tuple[int, int]) -> None:
     """As scipy.io.loadmat gives them."""
     data = {"Time": FAST, **measured(FAST)}
     check(read_log({n: v.reshape(shape) for n, v in data.items()}, TIMED, check=False))
+
+
+@pytest.mark.parametrize("called", ["t_{}", "time_{}", "{}_t", "{}_Time"])
+def test_a_time_beside_each_channel(tmp_path: Path, called: str) -> None:
+    """Of its own rate, or as long as others and at other times."""
+    held: dict[str, np.ndarray] = {}
+    for name in UNITS:
+        time_s = SLOW if name == "Speed" else FAST
+        held[name], held[called.format(name)] = measured(time_s)[name], time_s
+    late = FAST + 0.003
+    held["LatAcc"], held[called.format("LatAcc")] = measured(late)["LatAcc"], late
+    savemat(tmp_path / "run.mat", held)
+    with pytest.warns(SysidWarning, match="resampled at 100 Hz"):
+        log = read_log(tmp_path / "run.mat", SI, check=False)
+    known = np.isfinite(log["vx_mps"])
+    assert np.count_nonzero(known) == SLOW.size
+    for channel, name in MAP.items():
+        rows = known if name == "Speed" else np.arange(2, 390)
+        exact = FACTORS.get(channel, 1.0) * measured(log["time_s"][rows])[name]
+        np.testing.assert_allclose(
+            log[channel][rows], exact, atol=2e-4 if name == "LatAcc" else 1e-9
+        )
+
+
+def test_a_name_that_ends_like_a_time_is_a_channel(tmp_path: Path) -> None:
+    held = {"Time": FAST, **measured(FAST), "Steer_t": np.cos(FAST)}
+    savemat(tmp_path / "run.mat", held)
+    log = read_log(tmp_path / "run.mat", TIMED, check=False)
+    check(log)
+    np.testing.assert_allclose(log["Steer_t"], np.cos(FAST))
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_names_of_the_columns_of_a_matrix(tmp_path: Path, inside: bool) -> None:
+    """In a list beside it, as importdata of MATLAB gives them."""
+    matrix = np.stack([FAST, *measured(FAST).values()], axis=1)
+    names = np.array(["Time", *measured(FAST)], dtype=object)
+    held = {"data": matrix, "colheaders": names, "textdata": "a log"}
+    savemat(tmp_path / "run.mat", {"log": held} if inside else held)
+    check(read_log(tmp_path / "run.mat", TIMED, check=False))
+
+
+def test_names_of_another_number_name_nothing(tmp_path: Path) -> None:
+    matrix = np.stack([FAST, *measured(FAST).values()], axis=1)
+    savemat(tmp_path / "run.mat", {"data": matrix, "names": np.array(["a", "b"], dtype=object)})
+    with pytest.raises(InvalidInput, match=r"data\(:,1\)"):
+        read_log(tmp_path / "run.mat", TIMED, check=False)
+
+
+def test_channels_that_were_never_recorded_together_are_named() -> None:
+    pairs: dict[str, Any] = {n: (FAST, measured(FAST)[n]) for n in UNITS}
+    pairs["Speed"] = FAST + 3600.0, measured(FAST)["Speed"]
+    with pytest.raises(
+        InvalidInput, match=r"and Speed: were never recorded .*ends at 3\.99 s.*3600"
+    ):
+        read_log(pairs, SI, check=False)

@@ -5,29 +5,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from log_formats import FACTORS, FAST, MAP, UNITS, check_values, measured, read_told
+from log_formats import (
+    FAST,
+    MAP,
+    NAMES,
+    SI,
+    TIMED,
+    UNITS,
+    cells,
+    check_values,
+    measured,
+    read_told,
+    write,
+)
 
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.read import read_log
-
-SI: dict[str, Any] = {c: {"column": n, "factor": FACTORS.get(c, 1.0)} for c, n in MAP.items()}
-TIMED = {**SI, "time_s": "Time"}
-NAMES = ["Time", *UNITS]
-
-
-def cells(missing: str | None = None) -> list[list[str]]:
-    """Rows of cells; with `missing`, four of five of the speed are that word."""
-    rows = [[f"{t:.2f}", *(f"{measured(t)[n]:.9f}" for n in UNITS)] for t in FAST]
-    for k, row in enumerate(rows):
-        if missing is not None and k % 5:
-            row[NAMES.index("Speed")] = missing
-    return rows
-
-
-def write(folder: Path, *lines: str) -> Path:
-    path = folder / "run.csv"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
 
 
 @pytest.mark.parametrize("mark", ["|", " ", "   "])

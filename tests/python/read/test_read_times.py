@@ -110,3 +110,15 @@ def test_times_that_are_rounded(tmp_path: Path) -> None:
         read_log(path, {**SI, "time_s": "Time"}, check=False)
     log = read_log(path, {**SI, "time_s": {"rate_hz": 100}}, check=False)
     check_values(log, slow=(), atol=1e-8)
+
+
+@pytest.mark.parametrize("clock_s", [39_582.0, 100_000.0])
+def test_times_of_32_bits_are_even(clock_s: float) -> None:
+    """Of the day they come in steps of 4 ms and more, so that no two of 100 Hz are alike."""
+    time_s = (clock_s + FAST).astype(np.float32).astype(float)
+    assert np.ptp(np.diff(time_s)) > 0.003
+    columns: dict[str, Any] = {"time_s": time_s, **measured(FAST)}
+    log = read_log(columns, SI, check=False)
+    assert log.rate_hz == pytest.approx(100.0, rel=2e-3)
+    for channel, name in MAP.items():
+        np.testing.assert_allclose(log[channel], SI[channel]["factor"] * columns[name])

@@ -43,6 +43,7 @@ from .laws import (
 )
 from .longitudinal import check_force, check_longitudinal, held_speed_note
 from .motion import Motion
+from .over_ground import check_over_ground
 from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
 from .regression import in_most, size_of
 from .wheelbase import check_steering, gripping, is_model_car
@@ -50,6 +51,7 @@ from .wheelbase import check_steering, gripping, is_model_car
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
 _ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
 _LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2", "steer_rad")
+_ONE_WAY = 0.02  # of the largest reading: a channel that hardly goes below zero
 _HOLDS = 0.2  # of what it demands: a law that holds this closely needs no regression
 
 # Lever arms and roll bend the lateral speed more than the accelerations.
@@ -150,6 +152,8 @@ def contradictions(columns: Mapping[str, FloatArray], rate_hz: float) -> tuple[C
 def _check_laws(drive: Drive, model_car: bool) -> tuple[list[Contradiction], list[Contradiction]]:
     """Refuse what breaks a law; return notes on the clock of the steering, and on sizes."""
     channels = drive.motion.channels
+    if "vy_mps" in channels:
+        check_over_ground(drive)
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
         raise wrong_sign("vx_mps", "is negative for most of the drive", speed, drive)
@@ -221,6 +225,15 @@ def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
     odd = min(answers, key=lambda name: answers[name])
     other = "vx_mps * yaw_rate_radps" if odd == "ay_mps2" else "ay_mps2 / vx_mps"
     driver = turn if odd == "ay_mps2" else ay
+    size = drive.mean(c[odd])
+    one_way = float(size.min()) > -_ONE_WAY * float(size.max())
+    if one_way and cosine(size, np.abs(driver)) > 0.8:
+        raise Implausible(
+            odd,
+            f"{odd}: is never negative, though its size follows {other}, {drive.place(driver)}: "
+            f"where a bus sends size and sign apart, name the column of the sign in the channel "
+            f"map, sign = 'its name'",
+        )
     raise Implausible(
         odd,
         f"{odd}: does not follow {other}, as it must in every corner, {drive.place(driver)}; check "

@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,17 +15,20 @@ from ..._common.arrays import FloatArray
 from ...errors import InvalidInput
 from ...log import seconds_of_stamps
 from ..table import BadCell, Table
-from ..units import is_unit
+from ..units import is_unit, states_nothing
 from .text import read_text_table
 
 _DELIMITERS = ",;\t|"
 _NUMBER_WITH = r"(?:^|[{0}\n])\s*\"?([+-]?\d*{1}\d+(?:[eE][+-]?\d+)?)\"?\s*(?=[{0}\n]|$)"
+_DIGITS = re.compile(r"\W{0,2}\d[\d.,' ]*([eEdD][+-]?\d+)?\W?")
 # What programs write for a measurement that is missing: R, SQL, spreadsheets, Windows, loggers.
 _MISSING = {"na", "n/a", "#n/a", "#na", "#nv", "null", "none", "nil", "-", "--", "---",
             "1.#qnan", "-1.#ind", "1.#ind"}  # fmt: skip
 _LAST_ROWS = 20  # that tell how many cells a row has
 _FEWEST_CELLS = 3
 _LONGEST_PREAMBLE = 100
+_MOST_LINES_OF_TEXT = 5  # below the first one: sensors, descriptions, units, types
+_UNITLESS = {"-", "--", "---"}  # a line of units may hold nothing else
 
 
 def read_table(path: str | Path) -> Table:
@@ -32,8 +36,9 @@ def read_table(path: str | Path) -> Table:
 
     Between them is a comma, semicolon, tab or bar, or blanks where there is none of these. Lines
     that begin with ``#`` are comments; where only they come before the numbers the last of them
-    names the columns. So are lines of another form before the one with the names. A second line of
-    units is kept with the columns.
+    names the columns. So are lines of another form before the one with the names. A line of units
+    below is kept with the columns; of other lines of text above the numbers, such as sensors above
+    their signals, the names are the one whose cells differ most.
 
     Raises
     ------
@@ -63,13 +68,21 @@ def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
             f"the first line holds numbers ({', '.join(names[:3])}, ...); put a line with the "
             f"column names before it"
         )
-    units, body, first_line = _units_row(body, delimiter, names, first_line, units_row)
+    lead, body = _lines_of_text(body, delimiter, len(names), first_line, units_row)
+    names, units, others = _names_and_units(names, lead, units_row)
+    first_line += len(lead)
     if not body.strip():
         raise InvalidInput("there are no rows below the column names; record the log again")
     if delimiter != "," and "," in body:
         body = _with_points(body, delimiter, first_line)
     table = _read_fast(body, delimiter, names, units)
-    return table if table is not None else _read_slow(body, delimiter, names, units, first_line)
+    table = table or _read_slow(body, delimiter, names, units, first_line)
+    notes = [
+        f"the line '{delimiter.join(cells)[:60]}' above the numbers holds neither the names "
+        f"of the columns nor their units, and was left out"
+        for cells in others
+    ]
+    return replace(table, notes=(*table.notes, *notes))
 
 
 def _blanks_as_tabs(text: str) -> str:
@@ -153,7 +166,9 @@ def _preamble(lines: list[str]) -> int:
             named = _cells(line, delimiter)
             filled = sum(bool(cell.strip()) for cell in named)
             if len(named) == width < 2 * filled and not any(map(is_number, named)):
-                return k
+                above = _cells(lines[k - 1], delimiter) if k else []
+                sensors = len(above) == width and any(above) and len({*named}) < width
+                return k - 1 if sensors else k
     return 0
 
 
@@ -164,21 +179,65 @@ def _cells(line: str, delimiter: str) -> list[str]:
         return []
 
 
-def _units_row(
-    body: str, delimiter: str, names: tuple[str, ...], first_line: int, told_so: bool | None
-) -> tuple[dict[str, str], str, int]:
-    """Take a row of units off the body: no numbers in it, and mostly units that are known."""
-    row, _, rest = body.partition("\n")
-    try:
-        _, cells = next(_rows(row, delimiter, first_line), (first_line, []))
-    except InvalidInput:  # is told of where the rows are read
-        return {}, body, first_line
-    told = [cell.strip() for cell in cells if cell.strip()]
-    known = 2 * sum(is_unit(cell) for cell in told) > len(told) if told_so is None else told_so
-    if len(cells) != len(names) or any(map(is_number, told)) or not known:
-        return {}, body, first_line
-    units = {name: cell.strip() for name, cell in zip(names, cells, strict=True) if cell.strip()}
-    return units, rest, first_line + 1
+def _lines_of_text(
+    body: str, delimiter: str, width: int, first_line: int, told_so: bool | None
+) -> tuple[list[tuple[str, ...]], str]:
+    """Take the lines without a number or a time off the body, and return their cells."""
+    lead: list[tuple[str, ...]] = []
+    while len(lead) < _MOST_LINES_OF_TEXT:
+        row, _, rest = body.partition("\n")
+        try:
+            _, cells = next(_rows(row, delimiter, first_line), (first_line, []))
+        except InvalidInput:  # is told of where the rows are read
+            break
+        told = [cell.strip() for cell in cells if cell.strip()]
+        if len(cells) != width or any(map(_is_reading, told)):
+            break
+        units = [cell for cell in told if is_unit(cell)]
+        if not (told_so or all(map(states_nothing, units)) or 2 * len(units) > len(told)):
+            break  # of units that are mostly unknown the reader is told
+        if all(cell.lower() in _MISSING - _UNITLESS for cell in told):
+            break
+        lead.append(tuple(cell.strip() for cell in cells))
+        body = rest
+    return lead, body
+
+
+def _is_reading(cell: str) -> bool:
+    """Tell whether a cell is a number, in whatever notation, or a time."""
+    alike = is_number(cell) or _DIGITS.fullmatch(cell) is not None
+    return alike or seconds_of_stamps([cell]) is not None
+
+
+def _names_and_units(
+    names: tuple[str, ...], lead: list[tuple[str, ...]], told_so: bool | None
+) -> tuple[tuple[str, ...], dict[str, str], list[tuple[str, ...]]]:
+    """Tell names and units from the other lines of text above the numbers.
+
+    Units are mostly known ones, or stand in the first line below the names where it is told so.
+    """
+    lead = [cells for cells in lead if cells[1:] != names[1:]]  # the first may be renamed
+    is_units = [2 * sum(map(is_unit, c)) > sum(map(bool, c)) for c in lead]
+    if told_so and lead and not any(is_units):
+        is_units[0] = True
+    at = is_units.index(True) if any(is_units) else None
+    texts = [names, *(cells for k, cells in enumerate(lead) if k != at)]
+    named = own = max(texts, key=lambda cells: len({*cells} - {""}))
+    above = next((cells for cells in texts if cells is not own), None)
+    if above is not None and len({*own}) == len(own):
+        above = None
+    if above is not None:  # of signals with one name the sensor tells
+        groups, last = [], ""
+        for cell in above:
+            last = cell or last
+            groups.append(last)
+        own = tuple(
+            f"{group}.{name}" if group and own.count(name) > 1 else name
+            for group, name in zip(groups, own, strict=True)
+        )
+    stated = () if at is None else lead[at]
+    units = {name: unit for name, unit in zip(own, stated, strict=False) if unit}
+    return own, units, [cells for cells in texts if cells not in (named, above)]
 
 
 def is_number(text: str) -> bool:

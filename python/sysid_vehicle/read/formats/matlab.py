@@ -24,9 +24,8 @@ def read(path: Path, dbc: Path | None) -> Table | Recording:
     held = loadmat(path, squeeze_me=True, struct_as_record=False)
     leaves: list[Leaf] = []
     hidden = [name for name, value in held.items() if _is_opaque(value)]
-    for name, value in held.items():
-        if not name.startswith("__") and name not in hidden:
-            _walk(value, (name,), leaves)
+    own = {n: v for n, v in held.items() if not n.startswith("__") and n not in hidden}
+    _walk_all(own, (), leaves)
     if hidden and not leaves:
         raise InvalidInput(
             f"{path}: {hidden[0]} is an object of MATLAB (timeseries, table), which only MATLAB "
@@ -49,14 +48,33 @@ def _walk(value: Any, path: tuple[str, ...], leaves: list[Leaf]) -> None:
         fields = {name: getattr(value, name) for name in value._fieldnames}
         if _recorded(fields, path, leaves):
             return
-        for name, inner in fields.items():
-            _walk(inner, (*path, name), leaves)
+        _walk_all(fields, path, leaves)
     elif isinstance(value, np.ndarray):
         if value.dtype.kind in "biuf":
             leaves.append(Leaf(path, value))
         elif value.dtype.kind == "O":
             for k, inner in enumerate(value.flat, 1):
                 _walk(inner, (*path[:-1], f"{path[-1]}({k})"), leaves)
+
+
+def _walk_all(fields: dict[str, Any], path: tuple[str, ...], leaves: list[Leaf]) -> None:
+    """Take what stands side by side; a list of names beside a matrix names its columns."""
+    lists = [names for value in fields.values() if (names := _names(value))]
+    for name, value in fields.items():
+        fitting = [n for n in lists if np.ndim(value) == 2 and np.shape(value)[1] == len(n)]
+        if len(fitting) == 1 and value.dtype.kind in "biuf":
+            for column, own in zip(np.transpose(value), fitting[0], strict=True):
+                leaves.append(Leaf((*path, own), column))
+        else:
+            _walk(value, (*path, name), leaves)
+
+
+def _names(value: Any) -> list[str]:
+    """A cell array of different words, or rows of text, as the list of them; empty of all else."""
+    if not (isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "OU"):
+        return []
+    names = [str(name).strip() for name in value if isinstance(name, str)]
+    return names if len({*names} - {""}) == value.size else []
 
 
 def _recorded(fields: dict[str, Any], path: tuple[str, ...], leaves: list[Leaf]) -> bool:

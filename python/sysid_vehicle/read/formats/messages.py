@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -15,6 +16,8 @@ from ..recording import Entry, Recording, Signal
 
 _MOST_ELEMENTS = 64  # of an array that are listed one by one: more are an image or a scan
 _DEPTH = 8
+YAW = "quaternion_yaw"
+"""What the yaw angle of a quaternion is called below it."""
 _HEADERS = ("header", "stamp")  # hold the time, no measurement
 _SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
 _SAME_CLOCK_S = 1.0  # stamps that are farther from the recorder's time are of another clock
@@ -30,9 +33,28 @@ def numbers(message: Any, depth: int = _DEPTH) -> Iterator[tuple[str, Getter]]:
         if isinstance(value, (bool, int, float, np.number, np.bool_)):
             yield name, get
         elif not isinstance(value, (str, bytes, type(None))) and depth > 0:
+            if (yaw := _yaw_of(value)) is not None:
+                yield f"{name}/{YAW}", _then(get, yaw)
             for path, inner in numbers(value, depth - 1):
                 joint = "" if path.startswith("[") else "/"
                 yield f"{name}{joint}{path}", _then(get, inner)
+
+
+def _yaw_of(message: Any) -> Getter | None:
+    """The angle by which a quaternion turns about z, anticlockwise [rad]; None of anything else."""
+    parts = dict(_fields(message))
+    if {*parts} != {"x", "y", "z", "w"}:
+        return None
+
+    def yaw(turned: Any) -> float:
+        x, y, z, w = (float(parts[part](turned)) for part in "xyzw")
+        # Drivers that know no orientation send zeros.
+        length = x * x + y * y + z * z + w * w
+        return (
+            math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z) if length else math.nan
+        )
+
+    return yaw
 
 
 def _then(first: Getter, second: Getter) -> Getter:
@@ -131,7 +153,11 @@ def recording_of(
             topics[topic].take(message, recorded_ns, publisher)
         return _signals_of(topics, notes)
 
-    return Recording({name: Entry("", topic) for name, (topic, _, _) in places.items()}, fetch)
+    entries = {
+        name: Entry("rad" if path.endswith(f"/{YAW}") else "", topic)
+        for name, (topic, path, _) in places.items()
+    }
+    return Recording(entries, fetch)
 
 
 def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]:

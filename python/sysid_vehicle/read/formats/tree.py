@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -18,6 +19,7 @@ from ..units import factor_to
 T = TypeVar("T")
 
 _TIMES = ("time_s", "time", "t", "times", "timestamp", "timestamps", "seconds", "tout")
+_TIME_OF = re.compile(r"(?:t|time)_(.+)|(.+)_(?:t|time)", re.I)  # of one channel
 _VALUES = ("data", "values", "value", "signal")
 _MOST_COLUMNS = 64  # of a matrix that are channels
 
@@ -35,7 +37,8 @@ class Leaf:
 def contents_of(leaves: list[Leaf], where: str) -> Table | Recording:
     """Return a table where all arrays have one length and time, else channels with their own.
 
-    A channel's time is the array called ``time``, ``t``, ... of its length beside it, or else in a
+    A channel's time is the array called ``t_NAME``, ``time_NAME``, ``NAME_t`` or ``NAME_time``
+    beside it, or the one called ``time``, ``t``, ... of its length beside it, or else in a
     struct around it, in seconds or in the unit that it states. A struct of a time and ``data`` is
     one channel, called like the struct.
 
@@ -49,6 +52,7 @@ def contents_of(leaves: list[Leaf], where: str) -> Table | Recording:
     if not columns:
         raise InvalidInput(f"{where}: holds no arrays of numbers; save the channels as arrays")
     times = {c.path: c for c in columns if c.path[-1].lower() in _TIMES and c.time_s is None}
+    times |= {c.path: c for c in columns if c.time_s is None and _timed(c, columns) is not None}
     own_times = any(leaf.time_s is not None for leaf in columns) or len(times) > 1
     if not own_times and len({leaf.values.size for leaf in columns}) == 1:
         return _table(columns)
@@ -133,7 +137,20 @@ def _columns(leaf: Leaf) -> list[Leaf]:
     ]
 
 
+def _timed(time: Leaf, columns: list[Leaf]) -> Leaf | None:
+    """The channel beside an array of which that is the time by its name."""
+    found = _TIME_OF.fullmatch(time.path[-1])
+    if found is None or not (np.diff(time.values.astype(np.float64)) >= 0.0).all():
+        return None
+    own = (*time.path[:-1], found[1] or found[2])
+    there = (c for c in columns if c.path == own and c.values.size == time.values.size)
+    return next(there, None)
+
+
 def _time_of(leaf: Leaf, times: Mapping[tuple[str, ...], Leaf]) -> npt.NDArray[np.float64] | None:
+    for time in times.values():
+        if _timed(time, [leaf]) is not None:
+            return _kept(time)
     for depth in range(len(leaf.path) - 1, -1, -1):
         scope = leaf.path[:depth]
         for path, time in times.items():

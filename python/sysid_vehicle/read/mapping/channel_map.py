@@ -12,7 +12,7 @@ import numpy as np
 from ..._common.arrays import FloatArray
 from ..._common.files import read_toml, refuse_unknown
 from ...errors import InvalidInput
-from ...log import CHANNELS
+from ...log import CHANNELS, listed
 from ..recording import Recording
 from ..table import Table
 from .ground import Ground
@@ -63,9 +63,11 @@ class ChannelMap:
     def from_toml(cls, path: str | Path) -> ChannelMap:
         """Read a channel map, a TOML file with the table ``[channels]``, or ``[ground]``, or both.
 
-        Each entry is the name of the source column, a table with ``column``, ``factor`` (1),
-        ``offset`` (0), ``despike`` (false), ``delay_s`` (0) and, for ``vy_mps``, ``sideslip``
-        (false), or ``false`` to ignore the channel;
+        Each entry is the name of the source column, a table with ``column``, ``mean_with`` (a list
+        of others, whose mean with it is taken), ``factor`` (1),
+        ``offset`` (0), ``despike`` (false), ``delay_s`` (0), ``sign`` (the column that is 1 where
+        the value is negative) and, for ``vy_mps``, ``sideslip`` (false), or ``false`` to ignore
+        the channel;
         ``time_s = { rate_hz = 100 }`` numbers the rows of a file without time. ``[ground]`` has
         ``heading`` and ``east`` and ``north``, or ``speed`` and ``course``, in the same form, and
         for angles ``from``, which is ``"north"`` (clockwise) or ``"east"`` (anticlockwise).
@@ -135,6 +137,7 @@ class ChannelMap:
             If a source is not there, or if the map gives the time, which each channel has itself.
         """
         wanted = {c: source.column for c, source in self.sources.items() if c != "time_s"}
+        wanted |= {f"{c}, {n}": n for c, s in self.sources.items() for n in s.columns[1:]}
         time = self.sources["time_s"].column if "time_s" in self.sources else "time_s"
         if self.rate_hz is not None or time != "time_s":
             if recording.clocked is None:
@@ -177,7 +180,7 @@ class ChannelMap:
                 result[channel] = source.on_time(result["time_s"], result[channel])
         over_ground = {} if self.ground is None else self.ground.read(table, result, notes)
         skipped = {*result, *self.absent, *(_OVER_GROUND if over_ground else ())}
-        used = {source.column for source in self.sources.values()}
+        used = {column for source in self.sources.values() for column in source.columns}
         if self.ground is not None:
             used |= {source.column for source in self.ground.sources.values()}
         for name in dict.fromkeys(table.names):
@@ -191,6 +194,7 @@ class ChannelMap:
         if self.ground is not None:
             result.update(self.ground.in_the_body(result, over_ground))
         self._slip_to_speed(result)
+        _refuse_text(table, result)
         return result
 
     def _slip_to_speed(self, columns: dict[str, FloatArray]) -> None:
@@ -205,3 +209,25 @@ class ChannelMap:
         if "vx_mps" not in columns or "time_s" not in columns:
             return  # the log is refused for it
         columns["vy_mps"] = lateral_speed(columns["time_s"], columns["vx_mps"], angle)
+
+
+def _refuse_text(table: Table, columns: Mapping[str, FloatArray]) -> None:
+    """Tell of columns that hold text where a channel that every log needs is not among the others.
+
+    Raises
+    ------
+    InvalidInput
+        The message names the first cell.
+    """
+    absent = [
+        name for name, channel in CHANNELS.items() if channel.required and name not in columns
+    ]
+    text = [name for name in table.not_numbers if name not in table.seconds]
+    if absent and text:
+        bad = table.not_numbers[text[0]]
+        raise InvalidInput(
+            f"missing column{'s' if len(absent) > 1 else ''} {', '.join(absent)}, but "
+            f"{listed(text)} hold{'s' if len(text) == 1 else ''} no numbers (of {text[0]} the "
+            f"first cell is {bad}): export plain numbers, or name other columns in the channel map "
+            f"(columns of numbers: {listed(table.columns) or 'none'})"
+        )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..._common.arrays import FloatArray
-from ...log import CHANNELS
+from ...log import CHANNELS, standing
 from ..recording import Recording
 from ..table import Table
 from ..units import factor_to, unit_at_end, unit_in_name
@@ -46,9 +46,14 @@ class View:
         columns = self._held.columns if isinstance(self._held, Table) else {}
         return [n for n, x in columns.items() if x.size >= _FEWEST and (np.diff(x) > 0.0).all()]
 
+    @property
+    def stamps(self) -> list[str]:
+        """Columns of a table that hold dates and times of day."""
+        return list(self._held.seconds) if isinstance(self._held, Table) else []
+
     def is_stamps(self, name: str) -> bool:
         """Whether a column of a table holds dates and times of day."""
-        return isinstance(self._held, Table) and name in self._held.seconds
+        return name in self.stamps
 
     def values(self, names: list[str], time: str | None) -> dict[str, Signal]:
         """Return times and values by name; a table's column ``time`` tells its times."""
@@ -103,6 +108,7 @@ def even(
     known = {}
     for channel, (clock, values) in held.items():
         there = np.isfinite(clock) & np.isfinite(values)
+        there[standing(values, fewest=1)] = False  # a dropout, whatever its unit
         if np.count_nonzero(there) >= _FEWEST and (np.diff(clock[there]) > 0.0).all():
             known[channel] = factor * clock[there], values[there]
     if not known:

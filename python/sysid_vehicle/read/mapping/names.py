@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections import Counter
+from collections.abc import Iterable
 
 from ..units import FACTORS, plain, states_nothing, unit_at_end, without_unit
 from .ground import PARTS
@@ -18,20 +20,21 @@ _SIDESLIP = (
 _PATTERNS: dict[str, tuple[str, ...]] = {
     "time_s": (
         r"^time( s)?$",
-        r"^(t|zeit|(time ?)?stamps?( s| sec\w*)?|times?|tout|utc time)$",
+        r"^(t|ts|zeit|(time ?)?stamps?( s| sec\w*)?|times?|tout|utc time)$",
         r"^(temps|tempo|tiempo|tijd|tid|時間|時刻|时间)$",
         r"\btime\b|^(header )?stamp\b|^(sec(ond)?s|elapsed|epoch)\b",
     ),
     "vx_mps": (
-        r"^v ?x( mps)?$",
+        r"^[uv] ?x( mps)?$",
         r"twist linear x$|(long\w*|forward) (speed|vel\w*)|(speed|vel\w*) (x|long\w*)$",
-        r"(vehicle|ground|corr\w*|gps|car|veh) (speed|vel\w*)|^v (veh|car|ego)|v fzg",
+        r"(vehicle|ground|corr\w*|gps|car|veh) (speed|vel\w*)|^v (veh|car|ego)|v (fzg|signal)",
+        r"(speed|vel\w*) forward$|\bvel\w* hor x$|^wheel based vehicle speed",
         r"^(speed|velocity|vel|geschwindigkeit|v)$",
         r"\b(speed|velocity|geschwindigkeit)\b",
         r"^(vitesse|velocita|velocidade?|snelheid|hastighet)\b|車速|车速",
     ),
     "vy_mps": (
-        r"^v ?y( mps)?$",
+        r"^[uv] ?y( mps)?$",
         r"twist linear y$|lat\w* (speed|vel\w*)|(speed|vel\w*) (y|lat\w*)$|quergeschw\w*",
         r"(vitesse|velocita|velocidade?) (lat\w*|trans\w*)",
         _SIDESLIP,
@@ -40,24 +43,26 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"yaw ?rate|yaw ?vel\w*|gier ?(rate|geschw\w*)",
         r"angular velocity z$|gyro\w* (z|yaw)|twist angular z$|psi ?(p|dot|rate)$",
         r"^(w|omega|rate|gyro|ang vel) ?z$|\bgyro z\b|\byaw\b.*\b(dps|radps|degps)\b",
+        r"\b(ang\w*|rotation) rate (z|down)$|\brate (body|hor) z$|\bheading rate$|^r$|^d ?psi$",
         r"\b(lacet|imbardata|guinada)\b|^gier|girhastighet|ヨーレート|横摆角速度",
     ),
     "ax_mps2": (
-        r"^a ?x( mps2)?$|acc ?x$|x acc\w*$",
+        r"^a ?x( cg)?( mps2)?$|acc ?x$|x acc\w*$",
         r"long\w* (acc\w*|g\b)|acc\w* (x|long\w*)|g (force )?(long|x)\w*",
         r"inline acc\w*|laengsbeschl\w*|langsversnelling",
         r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
+        r"\bacc (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
     ),
     "ay_mps2": (
-        r"^a ?y( mps2)?$|acc ?y$|y acc\w*$",
+        r"^a ?y( cg)?( mps2)?$|acc ?y$|y acc\w*$",
         r"lat\w* (acc\w*|g\b)|acc\w* (y|lat\w*)|g (force )?(lat|y)\w*|querbeschl\w*",
         r"^ace?l\w* (lat|trans)\w*|^acc?el\w* trans\w*|dwarsversnelling",
-        r"横(加速度|g)|(侧|横)向加速度",
+        r"\bacc (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
     ),
     "steer_rad": (
         r"road ?wheel angle|^steer rad$|front wheel angle",
         r"steer\w* ?(wheel )?ang\w*|lenk(rad)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
-        r"\b(steer|steering|steered|delta)\b",
+        r"\b(steer|steering|steered|delta( ?wheel)?)\b|\b(sas|lws|lwi) (ang\w*|winkel)$",
         r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",
     ),
     "fx_n": (
@@ -72,14 +77,15 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
     ),
     "heading": (
         r"^true head(ing)?$|^(ins )?heading$|\bheading (true|angle)$",
-        r"^(azimuth|yaw|psi|yaw angle|gierwinkel|kurswinkel)$|\bheading$|\b(ins|imu) yaw$",
+        r"^(azimuth|yaw|psi|yaw angle|gierwinkel|kurswinkel)$|\bheading$",
+        r"\b(ins|imu|quaternion) yaw$",
     ),
     "course": (r"\bcourse\b|\bcog\b|ground ?track|track (angle|over ground|made good)|^track$",),
 }
 _REFUSED: dict[str, str] = {
     "time_s": r"\b(lap|run|delta|remaining|sector)\b",
-    "vx_mps": r"\b(wheel|eng|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*|wind|angular|steer\w*|y|z"
-    r"|trans\w*|lacet|imbardata|guinada|moteur|motore?|roues?|ruot[ae]|rueda|roda|vento?|viento)\b",
+    "vx_mps": r"\bheading rate\b|\b(wheel(?! based)|eng|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*"
+    r"|wind|angular|steer\w*|y|z|trans\w*|lacet|imbardata|guinada|moteur|motore?|roues?|ruot[ae]|rueda|roda|vento?|viento)\b",
     "vy_mps": r"\b(angular|wind|acc\w*)\b",
     "yaw_rate_radps": r"\b(acc\w*|target|ref\w*|covariance)\b",
     "ax_mps2": r"\b(yaw|lat\w*|vert\w*|angular|covariance|target)\b",
@@ -103,6 +109,16 @@ _SI = {
     **PARTS,
 }
 
+
+_SIGN = {"vz", "vorzeichen", "sign", "sgn"}
+"""Words in names of what is not 0 where another signal is negative."""
+
+_WHEELS = {  # in English and German
+    **dict.fromkeys(("fl", "lf", "vl"), ("front", "left")),
+    **dict.fromkeys(("fr", "rf", "vr"), ("front", "right")),
+    **dict.fromkeys(("rl", "lr", "hl"), ("rear", "left")),
+    **dict.fromkeys(("rr", "hr"), ("rear", "right")),
+}
 
 # As the databases of cars shorten words, whose names may have 32 letters.
 _SHORT = {"spd": "speed", "whl": "wheel", "lgt": "long", "lng": "long"}
@@ -129,7 +145,7 @@ def rank(name: str, unit: str, channel: str) -> float:
     text = words(name)
     if name == channel:
         return 10.0
-    if re.search(_REFUSED[channel], text):
+    if re.search(_REFUSED[channel], text) or _SIGN & {*text.split()}:
         return 0.0
     patterns = _PATTERNS[channel]
     # As it is, and without a unit at its end: vx_kmh is one of vx.
@@ -160,3 +176,27 @@ def si_unit(channel: str, name: str) -> str:
 def is_sideslip(name: str) -> bool:
     """Tell whether a name is that of the sideslip angle."""
     return re.search(_SIDESLIP, words(name)) is not None
+
+
+def sign_of(name: str, others: Iterable[str]) -> str:
+    """Return the column that holds the sign of another, by its name; empty if there is none.
+
+    ``ESP_VZ_Gierrate`` is that of ``ESP_Gierrate``, ``YawRate_Sign`` that of ``YawRate``.
+    """
+    own = Counter(words(name).split())
+    for other in others:
+        there = Counter(words(other).split())
+        if {*there} & _SIGN and Counter({w: k for w, k in there.items() if w not in _SIGN}) == own:
+            return other
+    return ""
+
+
+def wheel_of(name: str) -> tuple[str, str] | None:
+    """Return axle and side of the wheel that a name belongs to; None if it names no wheel."""
+    there = words(name).split()
+    for word in there:
+        if word in _WHEELS:
+            return _WHEELS[word]
+    axle = next((axle for axle in ("front", "rear") if axle in there), "")
+    side = next((side for side in ("left", "right") if side in there), "")
+    return (axle, side) if axle and side else None

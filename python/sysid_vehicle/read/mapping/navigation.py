@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..._common.arrays import as_float64
+from ...log.laws.over_ground import WITH_THE_CAR
 from .ground import FROM, Direction, from_east, polar, turns_of
 from .look import Signal
 
@@ -16,6 +17,8 @@ NAMED = ("east", "north", "course", "heading")
 
 _DEG = np.pi / 180.0
 _IN_DEGREES = 7.0  # an angle that goes beyond is no radian of one turn
+
+_MOST_PAIRS = 4  # of speeds of the body that are looked at
 
 # What makes a lateral speed; the second beside a speed.
 _COMBINATIONS = (("east", "north", "heading"), ("course", "heading"))
@@ -47,6 +50,42 @@ def combination(there: Mapping[str, list[str]]) -> dict[str, str]:
         if len(columns) == len(parts) == len(set(columns.values())):
             return columns
     return {}
+
+
+def twins(along: str, across: str, chosen: Mapping[str, list[str]]) -> list[tuple[str, str]]:
+    """Return pairs of columns for both speeds of the body: these two, then those of one message."""
+    pairs = [(along, across)]
+    for name in chosen["vx_mps"]:
+        message = name.rpartition("/")[0]
+        other = [n for n in chosen["vy_mps"] if message and n.rpartition("/")[0] == message]
+        pairs += [(name, n) for n in other[:1] if name != along]
+    return pairs[:_MOST_PAIRS]
+
+
+def is_over_ground(along: Signal, across: Signal, yaw_rate: Signal, unit: float | None) -> bool:
+    """Tell whether two speeds are those over ground: their direction turns with the car.
+
+    Parameters
+    ----------
+    along, across, yaw_rate : pair of ndarray, shape (n,)
+        Times [s] and values.
+    unit : float or None
+        Factor of the yaw rate, if it is stated.
+    """
+    (time_s, x), (other_s, y) = along, across
+    rate_s, rate = yaw_rate
+    there, turning = np.isfinite(other_s) & np.isfinite(y), np.isfinite(rate)
+    if min(np.count_nonzero(there), np.count_nonzero(turning)) < 2:
+        return False
+    y = np.interp(time_s, other_s[there], y[there])
+    course = np.full(time_s.shape, np.nan)
+    moving = np.hypot(x, y) > 0.0
+    course[moving] = np.unwrap(np.arctan2(y[moving], x[moving]))
+    if unit is None:
+        unit = _DEG if float(np.nanmax(np.abs(rate), initial=0.0)) > _IN_DEGREES else 1.0
+    rate = np.interp(time_s, rate_s[turning], unit * rate[turning])
+    turns = turns_of(time_s, course, as_float64(rate), as_float64(np.hypot(x, y)))
+    return WITH_THE_CAR[0] < abs(turns) < WITH_THE_CAR[1]
 
 
 def ground_speed(east: Signal, north: Signal) -> Signal:

@@ -171,6 +171,8 @@ def _lateral_law(drive: _Windows, factors: Mapping[str, float]) -> tuple[float, 
     change = drive.change("vy_mps")
     # In the unit of the column, whatever it is, the terms beside may be as large.
     unit = _slope(change, asked)
+    if not unit > 0.0:  # a column that is filled with one number
+        return None
     columns = [asked, turn, spin, np.ones(turn.size)]
     found = fit(change, columns, [np.inf, 0.06 * unit, unit, np.inf])
     if found.coherence < _FOLLOWS or not found.coefficients[0]:
@@ -334,6 +336,9 @@ def _steer(
     speed = factors["vx_mps"] * drive.mean("vx_mps")
     yaw = factors["yaw_rate_radps"] * drive.mean("yaw_rate_radps")
     rows = (speed > _MOVING * float(np.median(speed))) & (np.abs(speed * yaw) < LINEAR_MPS2)
+    if not rows.any():
+        notes["steer_rad"] = "the car does not drive: nothing tells its unit and sign"
+        return own[0]
     speed, steer = np.maximum(speed[rows], 1.0), drive.mean("steer_rad")[rows]
     curvature = yaw[rows] / speed
     alike = _cosine(curvature, steer)

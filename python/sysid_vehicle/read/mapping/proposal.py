@@ -22,11 +22,21 @@ class Proposed:
     why: str
     others: tuple[str, ...]
     sideslip: bool = False
+    sign: str = ""
+    mean_with: tuple[str, ...] = ()
+    despike: bool = False
 
     @property
     def source(self) -> Source:
         """As a channel map has it."""
-        return Source(self.column, self.factor, sideslip=self.sideslip)
+        return Source(
+            self.column,
+            self.factor,
+            sideslip=self.sideslip,
+            sign=self.sign,
+            mean_with=self.mean_with,
+            despike=self.despike,
+        )
 
 
 @dataclass(frozen=True)
@@ -68,7 +78,11 @@ class Proposal:
             if p.others:
                 lines.append(f"#   or one of: {listed(map(_quoted, p.others))}")
             entry = f"column = {_quoted(p.column)}, factor = {p.factor!r}"
+            if p.mean_with:
+                entry += f", mean_with = [{', '.join(map(_quoted, p.mean_with))}]"
             entry += ", sideslip = true" if p.sideslip else ""
+            entry += ", despike = true" if p.despike else ""
+            entry += f", sign = {_quoted(p.sign)}" if p.sign else ""
             lines.append(f"{channel} = {{ {entry} }}")
         for name in self.missing:
             lines.append(f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found")

@@ -10,16 +10,27 @@ import numpy as np
 from ..._common.arrays import FloatArray
 from ..._common.files import as_path
 from ...errors import InvalidInput
-from ...log import CHANNELS, Columns, Log
+from ...log import CHANNELS, Columns, Log, standing
 from ...vehicle import Vehicle
 from ..registry import blamed, recognised
+from ..units import factor_to
 from .ground import PARTS
 from .look import Signal, View, by_name, ended, even, ranked, stated
-from .names import is_sideslip, si_unit
-from .navigation import NAMED, Navigation, combination, ground_speed, told
+from .names import is_sideslip, si_unit, sign_of, wheel_of
+from .navigation import (
+    NAMED,
+    Navigation,
+    combination,
+    ground_speed,
+    is_over_ground,
+    told,
+    twins,
+)
 from .physics import scales, sideways
 from .proposal import Proposal, Proposed
+from .source import signed
 
+_DESPIKED = ("steer_rad", "ax_mps2", "ay_mps2")  # of states a log leaves dropouts out by itself
 _TURNED = ("yaw_rate_radps", "ay_mps2", "steer_rad")  # together, where the axes have z down
 _FINER = ((0.5, 1.0), (500.0, 1e-3), (5e5, 1e-6), (np.inf, 1e-9))  # steps below, factor of time
 
@@ -71,15 +82,27 @@ def propose_channels(
             if not (channel == "time_s" and view.has_times) and (found := ranked(view, channel))
         }
         if "time_s" not in chosen and not view.has_times:
-            rising = [name for name in view.rising if not any(name in c for c in chosen.values())]
+            rising = view.stamps or [
+                name for name in view.rising if not any(name in c for c in chosen.values())
+            ]
             chosen = {"time_s": rising, **chosen} if len(rising) == 1 else chosen
-        return _Guess(view, chosen).proposal(None if vehicle is None else vehicle.wheelbase_m)
+        axles = ("rear", "front")
+        if vehicle is not None and vehicle.drive_front_share < 0.5:
+            axles = ("front", "rear")
+        guess = _Guess(view, chosen, axles)
+        return guess.proposal(None if vehicle is None else vehicle.wheelbase_m)
+
+
+def _in_seconds(time: FloatArray) -> FloatArray:
+    """Return times in the unit that their steps ask for, which no name or unit is asked for."""
+    step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    return time * next(factor for below, factor in _FINER if step < below)
 
 
 class _Guess:
     """What the columns are taken for, step by step."""
 
-    def __init__(self, view: View, chosen: Mapping[str, list[str]]) -> None:
+    def __init__(self, view: View, chosen: Mapping[str, list[str]], axles: tuple[str, ...]) -> None:
         self.view, self.chosen = view, chosen
         # A column is one channel: the one that is first in the list of channels.
         self.first: dict[str, str] = {}
@@ -87,17 +110,29 @@ class _Guess:
             free = [name for name in names if name not in self.first.values()]
             if free:
                 self.first[channel] = free[0]
-        self.stated = stated(view, self.first)
-        self.parts = self._navigated()
+        self.parts = self._over_ground()
         self.factors: dict[str, float] = {}
         self.why: dict[str, list[str]] = {}
+        self.signs: dict[str, str] = {}
+        self.beside: tuple[str, ...] = ()
+        self.lost: set[str] = set()
+        self.parts = self.parts or self._navigated()
+        if "vx_mps" not in self.first and "east" not in self.parts:
+            self._wheels(axles)
+        self.stated = stated(view, self.first)
 
     def proposal(self, wheelbase_m: float | None) -> Proposal:
         """Ask the laws of motion for what names and units leave open."""
         time = self.first.get("time_s")
         columns = [*(n for c, n in self.first.items() if c != "time_s"), *self.parts.values()]
+        columns += self.beside
         held = self.view.values(columns, time)
         signals = {c: held[n] for c, n in self.first.items() if n in held}
+        for name in self.beside if held else ():
+            clock, values = signals["vx_mps"]
+            signals["vx_mps"] = clock, 0.5 * (values + np.interp(clock, *held[name]))
+        self._dropouts(signals)
+        self._signed(signals, time)
         units = stated(self.view, self.parts)
         if "east" in self.parts and held:
             signals["vx_mps"] = ground_speed(held[self.parts["east"]], held[self.parts["north"]])
@@ -111,6 +146,53 @@ class _Guess:
         nav = None if drive is None else self._by_navigation(own, units, *drive)
         return self._told(nav)
 
+    def _wheels(self, axles: tuple[str, ...]) -> None:
+        """Take the wheels of one axle where no other speed is logged, if their unit is stated.
+
+        An angular speed of a wheel looks like a speed in km/h.
+        """
+        speeds = {
+            wheel: name
+            for name in self.view.names
+            if (wheel := wheel_of(name)) and factor_to("m/s", self.view.said(name, "m/s"))
+        }
+        for axle in axles:
+            pair = [speeds.get((axle, side), "") for side in ("left", "right")]
+            if all(pair):
+                self.first["vx_mps"], self.beside = pair[0], (pair[1],)
+                self.chosen = {**self.chosen, "vx_mps": list(speeds.values())}
+                self._note(
+                    "vx_mps",
+                    f"mean of both wheels of the {axle} axle, which is the speed where they do "
+                    f"not slip: take the axle that is not driven",
+                )
+                return
+
+    def _over_ground(self) -> dict[str, str]:
+        """Columns of a velocity over ground that is called as that of the body, and the heading.
+
+        Messages of ROS have both in fields of one name: of several that which points along the car
+        is taken.
+        """
+        needed = {"vx_mps", "vy_mps", "yaw_rate_radps"}
+        if not needed <= {*self.first} or is_sideslip(self.first["vy_mps"]):
+            return {}
+        yaw = self.first["yaw_rate_radps"]
+        unit = stated(self.view, {"yaw_rate_radps": yaw}).get("yaw_rate_radps")
+        kept = {n for c, n in self.first.items() if c not in ("vx_mps", "vy_mps")}
+        heading = [n for n in ranked(self.view, "heading") if n not in kept]
+        pairs = twins(self.first["vx_mps"], self.first["vy_mps"], self.chosen)
+        for number, (along, across) in enumerate(pairs):
+            held = self.view.values([along, across, yaw], self.first.get("time_s"))
+            held = {name: (_in_seconds(time), x) for name, (time, x) in held.items()}
+            if not held or not is_over_ground(held[along], held[across], held[yaw], unit):
+                self.first.update({"vx_mps": along, "vy_mps": across} if number else {})
+                return {}
+        if not heading:
+            return {}
+        del self.first["vy_mps"]
+        return {"east": pairs[0][0], "north": pairs[0][1], "heading": heading[0]}
+
     def _navigated(self) -> dict[str, str]:
         """Columns of what navigation knows, where they make a lateral speed that is not logged."""
         if "vy_mps" in self.first:
@@ -119,6 +201,28 @@ class _Guess:
         there = {p: [n for n in ranked(self.view, p) if n not in kept] for p in NAMED}
         found = combination(there)
         return found if "east" in found or "vx_mps" in self.first else {}
+
+    def _dropouts(self, signals: Mapping[str, Signal]) -> None:
+        """Ask for what sensors read while they drop out to be taken out."""
+        for channel in [c for c in _DESPIKED if c in signals]:
+            found = standing(signals[channel][1], fewest=1)
+            if found.size:
+                self.lost.add(channel)
+                value = float(signals[channel][1][found[0]])
+                self._note(channel, f"drops out, first to {value:.6g}, {found.size} samples in all")
+
+    def _signed(self, signals: dict[str, Signal], time: str | None) -> None:
+        """Give their signs to channels that a bus sends as sizes, with the sign beside."""
+        for channel, (clock, values) in list(signals.items()):
+            sign = sign_of(self.first[channel], self.view.names)
+            if not sign or np.nanmin(values, initial=0.0) < 0.0:
+                continue
+            own_s, own = self.view.values([sign], time)[sign]
+            at = np.clip(np.searchsorted(own_s, clock, side="right") - 1, 0, None)
+            if own.size and {*np.unique(own[np.isfinite(own)]).tolist()} <= {0.0, 1.0}:
+                signals[channel] = clock, signed(values, own[at])
+                self.signs[channel] = sign
+                self._note(channel, "with its sign beside it")
 
     def _note(self, channel: str, text: str) -> None:
         if text:
@@ -212,6 +316,9 @@ class _Guess:
             "; ".join(filter(None, [*reasons, *self.why.get(channel, [])])),
             tuple(n for n in self.chosen[channel] if n != name)[:5],
             channel == "vy_mps" and is_sideslip(name),
+            self.signs.get(channel, ""),
+            self.beside if channel == "vx_mps" else (),
+            channel in self.lost,
         )
 
     def _ground(self, nav: Navigation) -> dict[str, Proposed]:

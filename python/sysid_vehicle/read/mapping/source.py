@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from ...log import CHANNELS, listed
 from ..table import Table
 from ..units import WHAT, factor_to, measures, states_nothing
 
-_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s", "sideslip")
+_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s", "sideslip", "sign", "mean_with")
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,9 @@ class Source:
 
     `delay_s` is how late the column is [s]: its values are taken from so much later in the file.
     `sideslip`, for `vy_mps` alone: the column is the sideslip angle, which `factor` makes radians;
-    the lateral speed is ``vx_mps tan(angle)``.
+    the lateral speed is ``vx_mps tan(angle)``. `sign`: another column that is not 0 where the
+    value is negative, for buses that send size and sign apart. `mean_with`: columns of which the
+    mean with `column` is taken, such as the speeds of both wheels of an axle.
     """
 
     column: str
@@ -34,6 +36,13 @@ class Source:
     despike: bool = False
     delay_s: float = 0.0
     sideslip: bool = False
+    sign: str = ""
+    mean_with: tuple[str, ...] = ()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All columns that it is read from."""
+        return (self.column, *self.mean_with, *filter(None, [self.sign]))
 
     def unit_of(self, channel: str) -> str:
         """The unit to which `factor` brings the column."""
@@ -50,21 +59,43 @@ class Source:
         InvalidInput
             If the column is not in the table (near names are given) or not numeric.
         """
-        if not table.counts[self.column]:
-            hint = near_names(self.column, table.names)
+        for name in self.columns:
+            if not table.counts[name]:
+                hint = near_names(name, table.names)
+                raise InvalidInput(
+                    f"{channel}: the channel map names column '{name}', which is not in "
+                    f"the file{hint}; columns are {listed(table.names)}"
+                )
+        own: list[FloatArray] = []
+        for name in (self.column, *self.mean_with):
+            factor = 1.0
+            if (self.factor, self.offset) == (1.0, 0.0):
+                factor = stated_factor(table, name, channel, si_unit, [] if own else notes)
+            own.append(factor * values_of(table, name, channel))
+        values = as_float64(np.mean(own, axis=0))
+        if not np.isfinite(values).any() and all(np.isfinite(x).any() for x in own):
             raise InvalidInput(
-                f"{channel}: the channel map names column '{self.column}', which is not in "
-                f"the file{hint}; columns are {listed(table.names)}"
+                f"{channel}: {listed((self.column, *self.mean_with))} have no sample at the same "
+                f"time, so there is no mean of them; take mean_with out of the channel map"
             )
-        values = values_of(table, self.column, channel)
-        if (self.factor, self.offset) == (1.0, 0.0):
-            values = values * stated_factor(table, self.column, channel, si_unit, notes)
+        if self.sign:
+            values = signed(values, table.column(self.sign))
         with np.errstate(over="ignore", invalid="ignore"):  # what is endless is refused later
             return as_float64(self.factor * values + self.offset)
 
     def on_time(self, time_s: FloatArray, values: FloatArray) -> FloatArray:
         """Return values that were read, earlier by `delay_s`; beyond the ends none is known."""
         return _earlier(time_s, values, self.delay_s) if self.delay_s else values
+
+
+def signed(values: FloatArray, sign: FloatArray) -> FloatArray:
+    """Return sizes with their sign, which holds until it is sent again; unknown before."""
+    known = np.flatnonzero(np.isfinite(sign))
+    if known.size == 0:
+        return np.full(values.shape, np.nan)
+    last = np.searchsorted(known, np.arange(values.size), side="right") - 1
+    negative = sign[known[np.maximum(last, 0)]] != 0.0
+    return as_float64(np.where(last < 0, np.nan, np.where(negative, -values, values)))
 
 
 def values_of(table: Table, column: str, channel: str) -> FloatArray:
@@ -132,6 +163,18 @@ def source_of(entry: Mapping[str, Any], channel: str, where: str) -> Source:
         entry, (*_SOURCE_KEYS, "rate_hz") if channel == "time_s" else _SOURCE_KEYS, where
     )
     column = entry.get("column", channel)
+    others = entry.get("mean_with", ())
+    if (
+        isinstance(others, str)
+        or not isinstance(others, Sequence)
+        or not all(isinstance(name, str) for name in others)
+        or len({column, *others}) < 1 + len(others)
+        or (others and channel == "time_s")
+    ):
+        raise InvalidInput(
+            f"{where}: mean_with = {others!r}; give a list of the columns whose mean with the "
+            f"first the channel is"
+        )
     if not isinstance(column, str):
         raise InvalidInput(f"{where}: column = {column!r}; give the name of the source column")
     despike, sideslip = (_flag(entry, key, where) for key in ("despike", "sideslip"))
@@ -144,7 +187,10 @@ def source_of(entry: Mapping[str, Any], channel: str, where: str) -> Source:
     if delay_s and channel == "time_s":
         raise InvalidInput(f"{where}: delay_s has no meaning for the time; give it for a channel")
     offset = number(entry, "offset", 0.0, where)
-    return Source(column, factor, offset, despike, delay_s, sideslip)
+    sign = entry.get("sign", "")
+    if not isinstance(sign, str):
+        raise InvalidInput(f"{where}: sign = {sign!r}; give the name of the column with the sign")
+    return Source(column, factor, offset, despike, delay_s, sideslip, sign, tuple(others))
 
 
 def _flag(entry: Mapping[str, Any], key: str, where: str) -> bool:

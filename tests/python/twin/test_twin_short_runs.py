@@ -1,0 +1,75 @@
+"""Short runs on simulators of others are judged as long ones are."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sysid_vehicle.errors import SysidWarning
+from sysid_vehicle.twin import (
+    CallableTwin,
+    Observation,
+    Observer,
+    SideBySide,
+    Unknown,
+    observe_with,
+)
+
+DT, N = 0.01, 1500
+FORCE_N = 800.0 + 1500.0 * np.sin(0.8 * DT * np.arange(N))
+MASS = Unknown("mass_kg", spread=300.0, apart=10.0, lower=500.0, upper=2000.0)
+
+
+def pulled(x: np.ndarray, u: np.ndarray, p: dict[str, float]) -> Any:
+    return (u[0] - 50.0 * x[0]) / p["mass_kg"]
+
+
+def car() -> np.ndarray:
+    """Acceleration of 1200 kg that start at 10 m/s, with noise."""
+    ax, speed = [], 10.0
+    for force in FORCE_N:
+        ax.append((force - 50.0 * speed) / 1200.0)
+        speed += DT * ax[-1]
+    return np.array(ax) + 0.05 * np.random.default_rng(154491).standard_normal(N)
+
+
+def found(
+    readings: np.ndarray, force: np.ndarray = FORCE_N, speed: float = 10.0, stride: int = 10
+) -> Observation:
+    twin = CallableTwin(
+        lambda x, u, p: x + DT * pulled(x, u, p),
+        lambda x, u, p: np.array([x[0], pulled(x, u, p)]),
+        np.array([speed]),
+        dt_s=DT,
+        input_names=("force_n",),
+        output_names=("vx_mps", "ax_mps2"),
+        state_names=("vx_mps",),
+        parameters={"mass_kg": 1000.0},
+    )
+    observer = Observer(batch=SideBySide([MASS], {"ax_mps2": 0.05}))
+    return observe_with(twin, force[:, None], {"ax_mps2": readings}, observer, stride=stride)
+
+
+@pytest.mark.parametrize("stride", [1, 10, 500])
+def test_what_is_right_is_believed_however_little_is_recorded(stride: int) -> None:
+    run = found(car(), stride=stride)
+    assert run.contradictions == ()
+    assert [r.channel for r in run.residuals] == ["ax_mps2"]
+    assert run.parameters["mass_kg"][-1] == pytest.approx(1200.0, rel=0.02)
+
+
+def test_a_twin_that_starts_elsewhere_is_not_believed() -> None:
+    with pytest.warns(SysidWarning, match="apart all the time"):
+        run = found(car(), speed=20.0)
+    assert run.spread["mass_kg"] == MASS.spread
+
+
+def test_inputs_in_another_unit_are_not_believed() -> None:
+    """The twin hardly moves: neither mass nor noise explains that."""
+    with pytest.warns(SysidWarning, match=r"the car's reading moves by .*, the twin's by .*units"):
+        found(car(), force=FORCE_N / 1e3)
+
+
+def test_readings_in_another_unit_are_not_believed() -> None:
+    with pytest.warns(SysidWarning, match=r"by a factor of 0\.1.*unit"):
+        found(car() / 9.80665)
