@@ -148,8 +148,8 @@ class Trial:
 
 
 def catalogue() -> tuple[sv.Effect, ...]:
-    """Effects that are hidden, and looked for: none that is no candidate without a leaning body."""
-    return tuple(e for e in sv.catalogue() if not e.beside)
+    """Effects that are hidden, and looked for: none that is a candidate on request alone."""
+    return tuple(e for e in sv.catalogue() if not e.on_request)
 
 
 def _truths() -> Iterator[tuple[Kind, tuple[str, ...], tuple[float, ...]]]:

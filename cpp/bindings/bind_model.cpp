@@ -70,7 +70,7 @@ py::list effects() {
         d["breaks"] = name_of(info.breaks);
         d["same_in_all_logs"] = info.same_in_all_logs;
         d["refines"] = names(info.refines);
-        d["beside"] = names(info.beside);
+        d["on_request"] = info.on_request;
         d["states"] = detail::kEffectStateCounts[i];
         d["scored_at_typical"] = info.scored_at_typical;
         d["needs_force"] = info.needs_force;

@@ -311,7 +311,8 @@ class Model:
             self.effect(e)
             for e in catalogue()
             if e.id not in self.effects
-            and (not e.waits_for or {*e.waits_for} & {*self.effects})
+            and not e.on_request
+            and (not e.refines or {*e.refines} & {*self.effects})
             and not (unknown_inertia and e.id == "yaw_inertia")
         )
 

@@ -8,11 +8,11 @@ from .candidates.instead import Instead, instead
 from .candidates.judge import judge, verdicts
 from .candidates.possible import (
     Size,
-    beside_others,
+    beside_what_they_refine,
     considered,
     possible,
+    refining,
     refused,
-    waiting,
 )
 from .candidates.verdicts import EffectVerdict, Verdicts
 from .candidates.widened import widened
@@ -68,7 +68,7 @@ __all__ = [
     "Unknown",
     "Verdicts",
     "Where",
-    "beside_others",
+    "beside_what_they_refine",
     "bias_report",
     "blocks",
     "ceiling",
@@ -81,12 +81,12 @@ __all__ = [
     "judge",
     "omnibus",
     "possible",
+    "refining",
     "refused",
     "separations",
     "suggest_manoeuvre",
     "unknown",
     "verdicts",
-    "waiting",
     "where",
     "widened",
 ]

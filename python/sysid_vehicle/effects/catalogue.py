@@ -130,8 +130,8 @@ class Effect:
     refines : tuple of str
         Effects that it refines: a candidate only beside one of them, or where a user names it.
         Where both are in a model neither takes a share of the errors that is its own.
-    beside : tuple of str
-        Effects that show what this one follows from: a candidate only beside one of them, too.
+    on_request : bool
+        A candidate only where a user names it.
     states : int
         How many states of its own it adds to the model.
     acts : tuple
@@ -159,7 +159,7 @@ class Effect:
     breaks: str = ""
     same_in_all_logs: bool = False
     refines: tuple[str, ...] = ()
-    beside: tuple[str, ...] = ()
+    on_request: bool = False
     acts: tuple[tuple[int, Any], ...] = ()
     channels: tuple[str, ...] = ()
     own_states: tuple[OwnState, ...] = ()
@@ -245,11 +245,6 @@ class Effect:
         return next((p for p in self.parameters if p.scan), None)
 
     @property
-    def waits_for(self) -> tuple[str, ...]:
-        """Effects of which a model must have one before this is a candidate by itself."""
-        return (*self.refines, *self.beside)
-
-    @property
     def form(self) -> str:
         """How it is scored without a refit; a refit always has the equation as it stands."""
         if self.scored_at_typical:
@@ -282,9 +277,10 @@ class Effect:
             lines.append(f"  through     {self.through}")
         if self.breaks:
             lines.append(f"  breaks      laws of motion: {self.breaks}")
-        if self.waits_for:
-            named = "or where it is named among the candidates"
-            lines.append(f"  considered  beside {' or '.join(self.waits_for)}, {named}")
+        if self.refines or self.on_request:
+            beside = [f"beside {' or '.join(self.refines)}"] if self.refines else []
+            named = ", or ".join([*beside, "where it is named among the candidates"])
+            lines.append(f"  considered  {named}")
         if self.same_in_all_logs:
             lines.append("  nuisance    the same in all logs of a car")
         return "\n".join(lines)

@@ -9,7 +9,7 @@ from typing import Literal
 from .._common.arguments import duration, whole
 from .._common.progress import teller
 from .._common.threads import before
-from ..diagnose import beside_others, considered, waiting
+from ..diagnose import beside_what_they_refine, considered, refining
 from ..effects import effect
 from ..estimate import Driving
 from ..identify import explaining
@@ -124,7 +124,7 @@ def improve(
     left_out = {effect(e).id for e in (*exclude, *settled)}
     wanted = tuple(e for e in considered(model, candidates) if e.id not in left_out)
     others = {*left_out, *(e.id for e in wanted)}
-    finer = tuple(e for e in waiting() if e.id not in others) if candidates is None else ()
+    finer = tuple(e for e in refining() if e.id not in others) if candidates is None else ()
     if sensors:
         wanted, finer = (sensors.narrowed(some, rules) for some in (wanted, finer))
     say = tell if tell is not None else teller(progress)
@@ -181,7 +181,7 @@ def improve(
         test_driving,
         asks=judging,
         rules=rules,
-        lacked=[e.id for e in (*wanted, *beside_others(finer, found.fit.model))],
+        lacked=[e.id for e in (*wanted, *beside_what_they_refine(finer, found.fit.model))],
         sizes=sizes,
         seed=seed,
         settled=settled,

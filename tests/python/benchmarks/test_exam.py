@@ -57,7 +57,7 @@ def test_the_grid_has_every_point_once(exam: SimpleNamespace) -> None:
     for name in exam.design.MANOEUVRES:
         assert sum(t.kind == "null" and t.driving == name for t in trials) == 400
     hidden = {t.truth[0] for t in trials if t.kind == "effect"}
-    assert hidden == {e.id for e in sv.catalogue() if not e.beside}
+    assert hidden == {e.id for e in sv.catalogue() if not e.on_request}
     assert len({t.truth for t in trials if t.kind == "pair"}) == 10
     assert set(exam.truths.OUTSIDE_FORCES) == set(exam.design.OUTSIDE)
     removed = next(t for t in trials if t.kind == "group removed" and t.truth == ("steer_lag",))

@@ -14,7 +14,7 @@ from sysid_vehicle import (
     effect,
     example_vehicle,
 )
-from sysid_vehicle.diagnose import beside_others, considered, waiting
+from sysid_vehicle.diagnose import beside_what_they_refine, considered, refining
 from sysid_vehicle.effects import base_parameters
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.estimate.driving import MEASURED
@@ -89,24 +89,32 @@ def test_effects_say_what_they_break_and_what_logs_share() -> None:
     assert all("the same in all logs of a car" in str(effect(e)) for e in shared)
 
 
-def test_what_waits_for_another_is_a_candidate_beside_it_or_where_it_is_named() -> None:
-    assert {e.id for e in catalogue() if e.refines} == {"body_roll"}
-    finer = {e.id for e in catalogue() if e.waits_for}
-    assert finer == {"body_roll", "front_roll_steer", "rear_roll_steer"}
-    assert finer == {e.id for e in waiting()}
+def test_what_refines_another_is_a_candidate_beside_it_or_where_it_is_named() -> None:
+    finer = {e.id for e in catalogue() if e.refines}
+    assert finer == {"body_roll"} == {e.id for e in refining()}
     assert "beside body_attitude or accelerometer_scale, or where" in str(effect("body_roll"))
     model = Model(example_vehicle())
     assert not finer & {e.id for e in model.candidates}
     for refined in effect("body_roll").refines:
         beside = model.add(refined)
         assert finer <= {e.id for e in beside.candidates}
-        assert beside_others(waiting(), beside) == waiting()
-    assert beside_others(waiting(), model.add("mass")) == ()
+        assert beside_what_they_refine(refining(), beside) == refining()
+    assert beside_what_they_refine(refining(), model.add("mass")) == ()
     # What they refine may have been dropped since.
-    assert beside_others(waiting(), model.add("body_roll")) == waiting()
+    assert beside_what_they_refine(refining(), model.add("body_roll")) == refining()
     assert [e.id for e in considered(model, ["mass", "body_roll"])] == ["mass", "body_roll"]
     assert considered(model.add("body_roll"), ["body_roll"]) == ()
     assert considered(model, None) == model.candidates
+
+
+def test_what_is_there_on_request_is_a_candidate_only_where_it_is_named() -> None:
+    asked = {e.id for e in catalogue() if e.on_request}
+    assert asked == {"front_roll_steer", "rear_roll_steer"}
+    assert "considered  where it is named" in str(effect("rear_roll_steer"))
+    model = Model(example_vehicle()).add("body_attitude", "body_roll")
+    assert not asked & {e.id for e in model.candidates}
+    assert {e.id for e in considered(model, [*asked, "mass"])} == asked | {"mass"}
+    assert considered(model.add("rear_roll_steer"), ["rear_roll_steer"]) == ()
 
 
 def test_a_scanned_parameter_is_tried_over_the_log_or_its_range() -> None:

@@ -49,7 +49,7 @@ def test_an_unknown_yaw_inertia_is_free_and_guessed(car: Vehicle) -> None:
 
 
 def test_candidates_are_what_the_model_lacks(truth: Model) -> None:
-    considered = [e.id for e in catalogue() if not e.waits_for]
+    considered = [e.id for e in catalogue() if not (e.refines or e.on_request)]
     assert [e.id for e in truth.candidates] == considered
     left = [e.id for e in truth.add("mass").candidates]
     assert left == [e for e in considered if e != "mass"]

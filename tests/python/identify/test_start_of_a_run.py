@@ -9,7 +9,7 @@ from sysid_vehicle.identify.maximum import log_likelihood_of, objectives
 LAGS = [
     e.id
     for e in catalogue()
-    if e.scored_at_typical and e.states and len(e.parameters) == 1 and not e.waits_for
+    if e.scored_at_typical and e.states and len(e.parameters) == 1 and not e.refines
 ]
 
 

@@ -71,8 +71,8 @@ struct EffectInfo {
     // Effects that it refines: a candidate only beside one of them, or where a user names it. Where
     // both are in a model neither takes a share of the errors that is its own.
     const char* refines = "";
-    // Effects that show what this one follows from: a candidate only beside one of them, too.
-    const char* beside = "";
+    // A candidate only where a user names it.
+    bool on_request = false;
 
     constexpr std::size_t parameter_count() const {
         std::size_t n = 0;

@@ -100,7 +100,7 @@ struct RollSteer : Effect {
                             .bounds = {-0.1, 0.1},
                             .usual = {-0.02, 0.02}},
                            kRollFrequency},
-            .beside = "body_attitude, accelerometer_scale, body_roll",
+            .on_request = true,
         };
         if (axle == Axle::kFront) {
             own.id = "front_roll_steer";

@@ -33,8 +33,8 @@ OF_A_FACTOR = "_error"
 def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
     """What may be added to a model: all that it lacks, or what is wanted of that.
 
-    What waits for another effect is among it only beside that, or where it is wanted. An effect
-    that is given itself keeps the bounds that it has.
+    What refines another effect is among it only beside that, or where it is wanted, what is there
+    on request only where it is. An effect that is given itself keeps the bounds that it has.
     """
     if candidates is None:
         return model.candidates
@@ -43,20 +43,21 @@ def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple
 
 
 def lacking(model: Model, names: Container[str]) -> tuple[Effect, ...]:
-    """What a model lacks of these effects, those that wait for others among them."""
-    asked = [model.effect(e) for e in waiting() if e.id not in model.effects]
+    """What a model lacks of these effects, those that are no candidates by themselves too."""
+    others = (e for e in catalogue() if e.refines or e.on_request)
+    asked = [model.effect(e) for e in others if e.id not in model.effects]
     known = {e.id: e for e in (*model.candidates, *model.seated(asked))}
     return tuple(sorted((e for e in known.values() if e.id in names), key=lambda e: e.index))
 
 
-def beside_others(finer: Iterable[Effect], model: Model) -> tuple[Effect, ...]:
-    """Those of which a model has what they wait for, or that have taken its place."""
-    return tuple(e for e in finer if not {e.id, *e.waits_for}.isdisjoint(model.effects))
+def beside_what_they_refine(finer: Iterable[Effect], model: Model) -> tuple[Effect, ...]:
+    """Those of which a model has what they refine, or that have taken its place."""
+    return tuple(e for e in finer if not {e.id, *e.refines}.isdisjoint(model.effects))
 
 
-def waiting() -> tuple[Effect, ...]:
-    """Effects of the catalogue that are candidates only beside others (`Effect.waits_for`)."""
-    return tuple(e for e in catalogue() if e.waits_for)
+def refining() -> tuple[Effect, ...]:
+    """Effects of the catalogue that refine others."""
+    return tuple(e for e in catalogue() if e.refines)
 
 
 def _between(e: Effect, given: Effect) -> Effect:

@@ -17,7 +17,7 @@ from ...diagnose import (
     Candidate,
     Diagnosis,
     Size,
-    beside_others,
+    beside_what_they_refine,
     diagnose,
     omnibus,
 )
@@ -318,9 +318,8 @@ class Search:
     def _diagnosis(self, fit: Fit, again: Sequence[str], refits: int = REFITS) -> Diagnosis:
         """All effects scored, some refitted again; where no time is left none is refitted."""
         left = self.ends - time.perf_counter()
-        finer = beside_others(self.finer, fit.model)
-        # Whatever leads: that may stand in for what refines an effect.
-        again = (*again, *(e.id for e in finer if e.refines))
+        finer = beside_what_they_refine(self.finer, fit.model)
+        again = (*again, *(e.id for e in finer))  # whatever leads: that may stand in for them
         return diagnose(
             fit,
             candidates=(*self.candidates, *finer),
