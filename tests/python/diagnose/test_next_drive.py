@@ -105,8 +105,31 @@ def test_limits_are_kept(gentle: Fit) -> None:
     )
     with pytest.raises(InvalidInput, match="widen"):
         nowhere.best  # noqa: B018
+    headline, remedy = str(nowhere).splitlines()
+    assert headline.endswith(" apart.")
+    assert remedy == nowhere.reserve == nowhere.to_dict()["reserve"]
     with pytest.raises(InvalidInput, match="DriveLimits: speed_mps = -1"):
         DriveLimits(-1.0)
+
+
+def test_small_ground_is_driven_slowly(gentle: Fit) -> None:
+    ground = DriveLimits(26.0, 7.0, area_m=(80.0, 25.0))
+    found = suggest_manoeuvre(gentle, LAG, RELAXATION, limits=ground)
+    assert found.suggestions
+    for s in found.suggestions:
+        assert max(s.ground_m) <= 80.0
+        assert min(s.ground_m) <= 25.0
+    # Short manoeuvres fit too, not circles alone.
+    assert len({s.manoeuvre.name for s in found.suggestions}) > 1
+
+
+def test_a_lorry_is_no_faster_than_a_car(start: Model) -> None:
+    car = start.vehicle
+    lorry = car.replace(lf_m=2.4, lr_m=2.4, mass_kg=14000.0, yaw_inertia_kgm2=9e4)
+    kart = car.replace(lf_m=0.6, lr_m=0.45, mass_kg=160.0, yaw_inertia_kgm2=20.0)
+    assert DriveLimits.usual(lorry).speed_mps == DriveLimits.usual(car).speed_mps == 36.0
+    assert DriveLimits.usual(kart).speed_mps < 30.0
+    assert DriveLimits.usual(lorry, speed_mps=25.0).speed_mps == 25.0
 
 
 def test_separations_of_all_pairs(fit: Fit) -> None:

@@ -95,7 +95,7 @@ NUMERICAL = {
         "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S",
     },
     "diagnose/experiment/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
-    "diagnose/experiment/limits.py": {"_EASIER"},
+    "diagnose/experiment/limits.py": {"_EASIER", "_SLOWER"},
     "diagnose/experiment/next_drive.py": {"_ENOUGH", "_OFTEN"},
     "diagnose/unexplained/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_RETAINED", "_VISIBLE"},
     "diagnose/unexplained/shape.py": {

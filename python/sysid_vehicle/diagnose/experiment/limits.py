@@ -16,6 +16,7 @@ from ...simulate import Drive
 from ...vehicle import Vehicle
 from .suggestion import ground_m
 
+_SLOWER = (1.0, 0.7, 0.5, 0.35)  # of the speed, where the ground is too small
 _EASIER = (1.0, 0.8, 0.6)  # of the lateral acceleration, where a manoeuvre asks too much
 
 
@@ -48,16 +49,16 @@ class DriveLimits:
 
     @classmethod
     def usual(cls, vehicle: Vehicle, **others: Any) -> DriveLimits:
-        """Limits that a car may have: its top speed goes as the root of its length.
+        """Limits that a car may have: the top speed of a small one goes as the root of its length.
 
         Parameters
         ----------
         vehicle : Vehicle
-            An ordinary one drives up to 36 m/s.
+            An ordinary one drives up to 36 m/s, and one that is larger is no faster.
         **others
             Limits that are known.
         """
-        length = length_beyond(vehicle.wheelbase_m)
+        length = min(length_beyond(vehicle.wheelbase_m), 1.0)
         return cls(**{"speed_mps": length**0.5 * cls.speed_mps, **others})
 
     def hold(self, drive: Drive) -> bool:
@@ -88,11 +89,16 @@ def menu(limits: DriveLimits, car: Vehicle) -> list[tuple[Manoeuvre, ...]]:
     Returns
     -------
     list of tuple of Manoeuvre
-        Each with gentler ones, for a car that does not survive it, or exceeds a limit.
+        Each with gentler ones, for a car that does not survive it, or exceeds a limit, and where
+        the ground is limited with slower ones on circles that are smaller accordingly.
     """
     lateral = min(limits.lateral_mps2, peak_lateral_mps2(car))
     length = length_beyond(car.wheelbase_m)
-    several = (_menu(limits.speed_mps, share * lateral, length) for share in _EASIER)
+    several = (
+        _menu(slow * limits.speed_mps, gentle * lateral, slow**2 * length)
+        for slow in (_SLOWER if limits.area_m is not None else _SLOWER[:1])
+        for gentle in _EASIER
+    )
     return list(zip(*several, strict=True))
 
 

@@ -116,7 +116,7 @@ class NextDrive(Printed):
         pair = f"{self.first.id} and {others}{nearest}, {_SIZES[self.sizes]},"
         told = f"{pair} are {self.now:.1f} standard errors"
         already = ": this driving tells them apart" if self.now >= self.enough else ""
-        return f"{told} apart{already}; after"
+        return f"{told} apart{already}"
 
     @property
     def reserve(self) -> str:
@@ -144,8 +144,10 @@ class NextDrive(Printed):
     __repr__ = brief
 
     def _parts(self) -> list[Part]:
+        if not self.suggestions:
+            return [f"{self._headline()}.", self.reserve]
         table = Table(self._head, self._rows())
-        return [self._headline(), table, *self._first(), self.reserve]
+        return [f"{self._headline()}; after", table, *self._first(), self.reserve]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything for a JSON file."""
