@@ -112,6 +112,22 @@ def test_limits_are_kept(gentle: Fit) -> None:
         DriveLimits(-1.0)
 
 
+def test_what_acts_alike_only_beside_others_is_asked_with_these(truth: Model, start: Model) -> None:
+    """A gain of the force is a mass with another yaw inertia and another drag, at these speeds."""
+    both = {"force_gain.drive_error": 0.08, "force_gain.brake_error": 0.08}
+    car = truth.add("force_gain").with_values(both)
+    log = drive(car, manoeuvres.step_steer((17.0, 27.0), (3.0, 6.0)), seed=5, rate_hz=50.0)
+    limits = DriveLimits(30.0, 8.0, duration_s=30.0)
+    now = [
+        suggest_manoeuvre(
+            identify(start.add(*beside), log, starts=1), "force_gain", "mass", limits=limits
+        ).now
+        for beside in ((), ("yaw_inertia", "aero_drag"))
+    ]
+    assert now[0] > 10.0
+    assert now[1] < 1.5
+
+
 def test_small_ground_is_driven_slowly(gentle: Fit) -> None:
     ground = DriveLimits(26.0, 7.0, area_m=(80.0, 25.0))
     found = suggest_manoeuvre(gentle, LAG, RELAXATION, limits=ground)
