@@ -61,9 +61,8 @@ def _of_names(study: Study) -> list[str]:
         also = f" --effects {','.join(beside)}" if beside else ""
         found.append(
             f"separate {first} from {few(others)}: `sysid-vehicle next-drive --between "
-            f"{','.join(group)}{also}`, or `sv.next_drive(study)`, designs a drive that does, if "
-            "one can; record it, and study it together with the training data. Or state what is "
-            "known of them in the vehicle file"
+            f"{','.join(group)}{also}` or `sv.next_drive(study)` says what to drive, or state what "
+            "is known of them in the vehicle file"
         )
     aliases = [a for a in study.added if a.stands_in]
     if aliases:
