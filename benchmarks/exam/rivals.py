@@ -23,7 +23,7 @@ def separate(trial: Trial, train: list[sv.Log]) -> dict[str, Any]:
     first, second = map(sv.effect, trial.truth)
     fit = sv.identify(truths.baseline(trial.vehicle), train, starts=1, workers=1)
     size = truths.rival_size(trial)
-    asked = sv.suggest_manoeuvre(fit, first, second, size=size, limits=_LIMITS, seed=trial.seed)
+    asked = sv.suggest_manoeuvre(fit, first, second, size=size, limits=_LIMITS)
     rng = np.random.default_rng((trial.seed, 1))
     there = truths.drive_one(trial, asked.best.manoeuvre, rng)
     again = sv.identify(fit.model, [*train, there], starts=1, workers=1)

@@ -44,7 +44,7 @@ from .rules import Rules
 from .saved import load
 from .sensors import SensorCheck, check
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
-from .study import Study, improve
+from .study import Study, improve, next_drive
 from .tyre import Tyre
 from .vehicle import Vehicle
 
@@ -100,6 +100,7 @@ __all__ = [
     "load",
     "load_effects",
     "manoeuvres",
+    "next_drive",
     "parameter",
     "propose_channels",
     "read_log",

@@ -1,4 +1,4 @@
-"""The command `next-drive`: the cheapest manoeuvre that tells two effects apart."""
+"""The command `next-drive`: the manoeuvre that tells effects apart with the least to drive."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..errors import InvalidInput
 from ..identify import identify
 from ..model import Model
 from ..vehicle import Vehicle
-from .log_arguments import add_driving, read_logs
+from .log_arguments import add_driving, add_effects, names, read_logs
 from .outputs import add_json, add_output, write_figures, write_picture
 
 _USUAL = DriveLimits()
@@ -18,11 +18,19 @@ _USUAL = DriveLimits()
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        "next-drive", help="the manoeuvre that tells two effects apart, as something to drive"
+        "next-drive", help="the manoeuvre that tells effects apart, as something to drive"
     )
     add_driving(parser)
     parser.add_argument(
-        "--between", required=True, metavar="A,B", help="the two effects, the likelier one first"
+        "--between",
+        required=True,
+        type=names,
+        metavar="A,B[,...]",
+        help="the likeliest effect, then those that it is to be told from",
+    )
+    add_effects(parser)
+    parser.add_argument(
+        "--nuisances", action="store_true", help="fit offsets that every measured log has"
     )
     parser.add_argument(
         "--top-speed",
@@ -47,10 +55,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Fit, suggest, print, write."""
-    pair = [name.strip() for name in args.between.split(",")]
-    if len(pair) != 2:
-        raise InvalidInput(f"--between {args.between}: give two effects, as in steer_lag,mass")
+    if len(args.between) < 2:
+        told = ",".join(args.between)
+        raise InvalidInput(f"--between {told}: give two effects or more, as in steer_lag,mass")
     model = Model(Vehicle.from_toml(args.vehicle))
+    if args.nuisances:
+        model = model.with_nuisances()
+    model = model.add(*args.effects)
     logs = read_logs(args.logs, args, model.vehicle)
     area = None if args.area is None else (args.area[0], args.area[1])
     known = {"lateral_mps2": args.lateral, "area_m": area, "duration_s": args.duration}
@@ -58,7 +69,7 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
         known["speed_mps"] = args.top_speed
     limits = DriveLimits.usual(model.vehicle, **known)
     fit = identify(model, logs)
-    found = suggest_manoeuvre(fit, *pair, limits=limits)
+    found = suggest_manoeuvre(fit, *args.between, limits=limits)
     print(found)
     write_figures(args.json, found.to_dict(), heard)
     if args.csv is not None:

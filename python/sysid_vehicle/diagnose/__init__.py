@@ -23,7 +23,8 @@ from .diagnose import diagnose
 from .evidence.coordinates import blocks
 from .evidence.evidence import Evidence
 from .experiment.hiding import Bias, BiasReport, bias_report
-from .experiment.next_drive import DriveLimits, NextDrive, separations, suggest_manoeuvre
+from .experiment.limits import DriveLimits
+from .experiment.next_drive import NextDrive, separations, suggest_manoeuvre
 from .experiment.suggestion import Suggestion
 from .unexplained.ceiling import Ceiling, Explainable, ceiling
 from .unexplained.change_points import ChangePoint

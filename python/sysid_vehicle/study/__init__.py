@@ -4,6 +4,7 @@ from ..rules import Verdict
 from .ahead.horizons import LATERAL, PREDICTED, Horizons, horizons
 from .ahead.waterfall import Waterfall, look_ahead
 from .improve import improve
+from .next_drive import next_drive
 from .results.added import AddedEffect
 from .results.hidden import open_effects
 from .results.sentences import left_out
@@ -21,5 +22,6 @@ __all__ = [
     "improve",
     "left_out",
     "look_ahead",
+    "next_drive",
     "open_effects",
 ]

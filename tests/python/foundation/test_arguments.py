@@ -102,7 +102,6 @@ def test_seeds_of_everything_that_draws(fit: Fit, truth: Model) -> None:
         lambda: sv.drive(truth, sv.manoeuvres.lap(10.0), seed=-1),
         lambda: sv.diagnose(fit, seed=-1),
         lambda: sv.where(fit, seed=-1),
-        lambda: sv.suggest_manoeuvre(fit, "mass", "steer_lag", seed=-1),
     )
     for draw in draws:
         with pytest.raises(InvalidInput, match=r"seed = -1[:;] give a whole number"):

@@ -45,7 +45,7 @@ NUMERICAL = {
     },
     "diagnose/evidence/directions.py": {"_ROWS"},
     "diagnose/evidence/evidence.py": {"HELD", "_AT_ONCE"},
-    "diagnose/experiment/information.py": {"_COPIED"},
+    "diagnose/experiment/information.py": {"COPIED"},
     "diagnose/candidates/instead.py": {"_MEMORIES_S", "_SHAPES_REMEMBERED"},
     "diagnose/candidates/possible.py": {"_AT_BOUND"},
     "diagnose/candidates/posterior.py": {"_KEPT", "_LEAST"},
@@ -95,7 +95,8 @@ NUMERICAL = {
         "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S",
     },
     "diagnose/experiment/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
-    "diagnose/experiment/next_drive.py": {"_ENOUGH"},
+    "diagnose/experiment/limits.py": {"_EASIER", "_SLOWER"},
+    "diagnose/experiment/next_drive.py": {"_ENOUGH", "_OFTEN"},
     "diagnose/unexplained/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_RETAINED", "_VISIBLE"},
     "diagnose/unexplained/shape.py": {
         "_KNOTS", "_KNOTS_OF_PAIR", "_SIZES", "_SIZES_OF_PAIR", "_SMOOTH", "_FINE", "_DRAWS",

@@ -187,7 +187,9 @@ def test_what_is_confounded_is_to_be_told_apart(unknown: Study) -> None:
     drag = AddedEffect("aero_drag", (), 2.0, 1.0, 1e-9, confounded_with=("head_wind",))
     proxy = AddedEffect("mass", (), 2.0, 1.0, 1e-9, stands_in="it is not constant")
     first, second, *_ = next_steps(replace(unknown, added=(drag, proxy)))
-    assert first.startswith("separate aero_drag from head_wind: `sysid-vehicle next-drive`")
+    asked = "`sysid-vehicle next-drive --between aero_drag,head_wind`"
+    assert first.startswith(f"separate aero_drag from head_wind: {asked}")
+    assert "sv.next_drive(study)" in first
     assert second.startswith("do not take the size of mass as a property of the car")
 
 

@@ -26,7 +26,7 @@ from ..evidence.evidence import Evidence
 from ..evidence.projection import pseudo_inverse
 from ..evidence.sensitivity import sensitivities
 
-_COPIED = 1e-12  # share of a column's square that others leave, below which it is their copy
+COPIED = 1e-12  # share of a column's square that others leave, below which it is their copy
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +54,10 @@ class Information:
         if (self.fitted, self.effects) != (other.fitted, other.effects):
             raise InvalidInput("information about other parameters cannot be added")
         return replace(self, matrix=as_float64(self.matrix + other.matrix))
+
+    def times(self, count: int) -> Information:
+        """Of so many drives that are alike."""
+        return replace(self, matrix=as_float64(count * self.matrix))
 
     def about(self, effect: str, *given: str) -> FloatArray:
         """Information about an effect's parameters that the fit and the effects `given` leave.
@@ -93,7 +97,7 @@ class Information:
     def _solve(self, which: list[int], right: FloatArray) -> FloatArray:
         """Least squares with the block `which`, whose columns may copy each other."""
         block = self.matrix[np.ix_(which, which)]
-        return as_float64(pseudo_inverse(block, _COPIED)[0] @ right)
+        return as_float64(pseudo_inverse(block, COPIED)[0] @ right)
 
 
 def information_of(fit: Fit, driving: Driving, effects: Sequence[Effect]) -> Information:

@@ -1,120 +1,76 @@
-"""Which drive would tell two effects apart, and by how many standard errors.
+"""Which drive would tell effects apart, and by how many standard errors.
 
-Every manoeuvre of a menu within the limits is driven in simulation, at the fit. Its information is
-added to that of the driving at hand (`information.py`); the two effects are as far apart as the
-nearer of them stands out from the other (T-optimality, linearised: Atkinson & Fedorov, Biometrika
-1975).
+Every manoeuvre of a menu within the limits is driven in simulation, and what it would tell is added
+to the driving at hand (`rivals.py`). An effect is as far from its rivals as the nearer of each two
+stands out from the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
-import numpy as np
-
-from ... import manoeuvres
-from ..._common.arguments import check_positive
 from ..._common.printed import Part, Printed, Table
 from ..._common.progress import with_progress
-from ..._common.text import brief
-from ...effects import Effect, length_beyond
+from ..._common.text import brief, few
+from ...effects import Effect
 from ...errors import InvalidInput, NumericalError
-from ...estimate import MEASURED, Driving
-from ...estimate.inputs import white_noise_std
-from ...identify import Fit, explaining, refine
+from ...estimate import Driving
+from ...identify import Fit, explaining
 from ...log import Log
 from ...manoeuvres import Manoeuvre
 from ...model import Model
 from ...simulate import Drive, SensorNoise, drive_truth
-from ...vehicle import Vehicle
+from ...vehicle import AXLES
 from .information import Information, information_of
-from .suggestion import Suggestion, ground_m
+from .limits import DriveLimits, menu
+from .rivals import Apart, Fitted, Foreseen, typical
+from .suggestion import Suggestion
 
+Sizes = Literal["at hand", "typical", "given"]
+_SIZES: dict[Sizes, str] = {
+    "at hand": "as large as this driving shows them",
+    "typical": "of typical size",
+    "given": "of the size asked for",
+}
 _ENOUGH = 5.0  # standard errors
-
-
-@dataclass(frozen=True)
-class DriveLimits:
-    """What can be driven.
-
-    Parameters
-    ----------
-    speed_mps : float
-        Highest speed.
-    lateral_mps2 : float
-        Highest lateral acceleration, either side.
-    area_m : tuple of 2 floats, optional
-        Longer and shorter side of the ground there is.
-    duration_s : float
-        Longest drive.
-    """
-
-    speed_mps: float = 36.0
-    lateral_mps2: float = 8.5
-    area_m: tuple[float, float] | None = None
-    duration_s: float = 120.0
-
-    def __post_init__(self) -> None:
-        limits = {"speed_mps": self.speed_mps, "lateral_mps2": self.lateral_mps2}
-        check_positive("DriveLimits", **limits, duration_s=self.duration_s)
-        if self.area_m is not None and not min(self.area_m) > 0.0:
-            raise InvalidInput(f"area_m is {self.area_m}; give two positive lengths")
-
-    @classmethod
-    def usual(cls, vehicle: Vehicle, **others: Any) -> DriveLimits:
-        """Limits that a car may have: its top speed goes as the root of its length.
-
-        Parameters
-        ----------
-        vehicle : Vehicle
-            An ordinary one drives up to 36 m/s.
-        **others
-            Limits that are known.
-        """
-        length = length_beyond(vehicle.wheelbase_m)
-        return cls(**{"speed_mps": length**0.5 * cls.speed_mps, **others})
-
-    def hold(self, drive: Drive) -> bool:
-        """Whether a drive stayed within them."""
-        speed, lateral = drive.states[:, 0], drive.outputs[:, 4]
-        inside = (
-            speed.max() <= 1.02 * self.speed_mps
-            and np.abs(lateral).max() <= 1.05 * self.lateral_mps2
-            and drive.log.duration_s <= self.duration_s
-        )
-        if self.area_m is None or not inside:
-            return bool(inside)
-        long, short = ground_m(drive)
-        return long <= max(self.area_m) and short <= min(self.area_m)
+_OFTEN = 20  # times that a drive may be repeated on several days
 
 
 @dataclass(frozen=True, eq=False)
 class NextDrive(Printed):
-    """Drives that tell two effects apart.
+    """Drives that tell an effect from others.
 
     Attributes
     ----------
-    first, second : Effect
+    first : Effect
+    rivals : tuple of Effect
     now : float
-        Standard errors between them, of the size asked for, with the driving at hand.
+        Standard errors between it and the nearest of them with the driving at hand.
+    enough : float
+        Standard errors that are wanted.
+    sizes : str
+        Of the effects: `at hand`, as large as the driving at hand shows them; `typical`, where it
+        shows none of them; or `given`.
     suggestions : tuple of Suggestion
-        The cheapest that is enough first; the others by standard errors.
+        Those that are enough first, then those that would be if driven more often than the longest
+        drive allows, each by the least to drive; the others by standard errors.
     refused : int
         Manoeuvres of the menu beyond the limits, or that the car did not survive.
     """
 
     first: Effect
-    second: Effect
+    rivals: tuple[Effect, ...]
     now: float
+    enough: float
+    sizes: Sizes
     suggestions: tuple[Suggestion, ...]
     refused: int
 
     @property
     def best(self) -> Suggestion:
-        """The cheapest drive that separates the two by five standard errors, or the most telling.
+        """The drive that is enough with the least to drive, or else the most telling.
 
         Raises
         ------
@@ -125,13 +81,24 @@ class NextDrive(Printed):
             raise InvalidInput("no manoeuvre of the library is within the limits; widen them")
         return self.suggestions[0]
 
-    _HEAD = ("manoeuvre", "standard errors", "time [s]", "m/s", "a_y [m/s2]", "ground [m]")
+    @property
+    def reaches(self) -> bool:
+        """Whether the first suggestion is enough."""
+        return bool(self.suggestions) and self.best.sigmas >= self.enough
+
+    @property
+    def _head(self) -> tuple[str, ...]:
+        other = self.rivals[0].id if len(self.rivals) == 1 else "another"
+        errors = (f"standard errors if {self.first.id}", f"if {other}")
+        return ("manoeuvre", *errors, "times", "time [s]", "m/s", "a_y [m/s2]", "ground [m]")
 
     def _rows(self) -> list[list[str]]:
         return [
             [
                 s.manoeuvre.name,
-                f"{s.sigmas:.1f}",
+                f"{s.if_acts[self.first.id]:.1f}",
+                f"{min(s.if_acts[e.id] for e in self.rivals):.1f}",
+                str(s.times),
                 f"{s.duration_s:.0f}",
                 "{:.0f} to {:.0f}".format(*s.speed_mps),
                 f"{s.lateral_mps2:.1f}",
@@ -144,19 +111,53 @@ class NextDrive(Printed):
         return [f"The first: {s.instructions()}" for s in self.suggestions[:1]]
 
     def _headline(self) -> str:
-        pair = f"{self.first.id} and {self.second.id}"
-        return f"{pair} are {self.now:.1f} standard errors apart; after"
+        others = few([e.id for e in self.rivals])
+        nearest = " (the nearest)" if len(self.rivals) > 1 else ""
+        pair = f"{self.first.id} and {others}{nearest}, {_SIZES[self.sizes]},"
+        told = f"{pair} are {self.now:.1f} standard errors"
+        already = ": this driving tells them apart" if self.now >= self.enough else ""
+        return f"{told} apart{already}"
+
+    @property
+    def reserve(self) -> str:
+        """What is to be said of the suggestions; empty where the first is enough."""
+        if self.reaches:
+            return ""
+        if not self.suggestions:
+            return "No manoeuvre of the library is within the limits: widen them."
+        told = [f"None of these reaches {self.enough:g} standard errors"]
+        # Which of them may act unnoticed, and which would be told.
+        hidden = [
+            e.id
+            for e in (self.first, *self.rivals)
+            if all(s.if_acts[e.id] < self.enough for s in self.suggestions)
+        ]
+        if len(hidden) <= len(self.rivals):
+            told[0] += f" if it is {' or '.join(hidden)}"
+        often = self.best.needed
+        if often is not None:
+            told.append(f"The first would be enough driven {often} times, beyond the longest drive")
+        shown = "; ".join(f"{e.id} by {e.excited_by}" for e in (self.first, *self.rivals[:3]))
+        told.append(f"What shows them: {shown}")
+        return ". ".join(told) + "."
 
     __repr__ = brief
 
     def _parts(self) -> list[Part]:
-        return [self._headline(), Table(self._HEAD, self._rows()), *self._first()]
+        if not self.suggestions:
+            return [f"{self._headline()}.", self.reserve]
+        table = Table(self._head, self._rows())
+        return [f"{self._headline()}; after", table, *self._first(), self.reserve]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything for a JSON file."""
         return {
-            "between": [self.first.id, self.second.id],
+            "between": [self.first.id, *(e.id for e in self.rivals)],
             "standard_errors_now": self.now,
+            "enough": self.enough,
+            "reached": self.reaches,
+            "sizes": self.sizes,
+            "reserve": self.reserve,
             "refused": self.refused,
             "suggestions": [s.to_dict() for s in self.suggestions],
         }
@@ -175,39 +176,43 @@ def separations(
     several = tuple(fit.model.effect(e) for e in effects)
     known = information if information is not None else information_of(fit, fit.driving, several)
     shown = [e for e in several if any(e.id == k.id for k in known.effects)]
-    return {
-        (a.id, b.id): _apart(known, a, b, None) for i, a in enumerate(shown) for b in shown[i + 1 :]
-    }
+
+    def apart(a: Effect, b: Effect) -> float:
+        return min(
+            known.separation(a.id, typical(a), b.id), known.separation(b.id, typical(b), a.id)
+        )
+
+    return {(a.id, b.id): apart(a, b) for i, a in enumerate(shown) for b in shown[i + 1 :]}
 
 
 @explaining
 def suggest_manoeuvre(
     fit: Fit,
     first: Effect | str,
-    second: Effect | str,
-    *,
+    *rivals: Effect | str,
     size: Sequence[float] | None = None,
     limits: DriveLimits | None = None,
     enough: float = _ENOUGH,
-    seed: int = 0,
     progress: bool | None = None,
 ) -> NextDrive:
-    """Suggest the cheapest drive that tells two effects apart.
+    """Suggest the drive with the least to drive that tells an effect from others.
+
+    Drives are those of the library, once, or as often as the longest drive allows.
 
     Parameters
     ----------
     fit : Fit
-        Without either effect.
-    first, second : Effect or str
-        The likelier one first.
+        Without any of the effects.
+    first, *rivals : Effect or str
+        The likeliest one first, and one rival or several.
     size : sequence of float, optional
-        Size of the first, as distance from its null values; by default a typical one.
+        Size of the first, as distance from its null values. By default the effects have the sizes
+        that the fit's driving gives them, where it shows that one of them acts (`Rules.strict`),
+        and typical ones otherwise.
     limits : DriveLimits, optional
         What can be driven; by default `DriveLimits.usual`.
     enough : float
         Standard errors that are wanted.
-    seed : int
-        Of the simulated drives.
     progress : bool, optional
         Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
@@ -218,118 +223,92 @@ def suggest_manoeuvre(
     Raises
     ------
     InvalidInput
-        The model has one of the effects already, or the driving cannot show it.
+        The model has one of the effects already, one is named twice or has no rival, or the
+        driving cannot show it.
     """
-    a, b = fit.model.effect(first), fit.model.effect(second)
-    for e in (a, b):
-        if e.id in fit.model.effects:
-            raise InvalidInput(f"the model has '{e.id}' already; give a fit without it")
-    car = fit.model.vehicle
-    bounds = limits if limits is not None else DriveLimits.usual(car)
+    effects = _asked(fit, (first, *rivals))
     psi = None if size is None else tuple(size)
-    fit = _with_noise_beside(fit, a, psi)
-    here = information_of(fit, fit.driving, (a, b))
-    now = _apart(here, a, b, psi)
-    menu = _menu(bounds, length_beyond(car.wheelbase_m))
-    truth = fit.model.add(a).with_values(_values(a, psi))
+    bounds = limits if limits is not None else DriveLimits.usual(fit.model.vehicle)
+    fitted = Fitted.of(fit, effects) if psi is None else None
+    known = fitted if fitted is not None else Foreseen.of(fit, effects, psi)
+
+    def logged(drive: Drive) -> Driving:
+        return Driving.of(_as_logged(drive, fit))
+
     found, refused = [], 0
-    for manoeuvre in with_progress(menu, "manoeuvres", shown=progress):
-        drive = _driven(truth, manoeuvre, fit, bounds, seed)
-        if drive is None:
+    choice = menu(bounds, _as_fitted(known.car).vehicle)
+    for alternatives in with_progress(choice, "manoeuvres", shown=progress):
+        tried = ((m, _driven(known.car, m, fit)) for m in alternatives)
+        driven = next(((m, d) for m, d in tried if d is not None and bounds.hold(d)), None)
+        if driven is None:
             refused += 1
             continue
-        log = _as_logged(drive, fit)
-        there = information_of(fit, Driving.of(log), (a, b))
-        apart = _apart(here + there, a, b, psi)
-        found.append(Suggestion(manoeuvre, log.duration_s, apart, drive))
-    found.sort(key=lambda s: (s.sigmas < enough, s.duration_s if s.sigmas >= enough else -s.sigmas))
-    return NextDrive(a, b, now, tuple(found), refused)
+        manoeuvre, drive = driven
+
+        def again(car: Model, manoeuvre: Manoeuvre = manoeuvre) -> Drive | None:
+            return _driven(car, manoeuvre, fit)
+
+        apart = known.after(drive, again, logged)
+        most = max(int(bounds.duration_s / drive.log.duration_s), 1)
+        runs = range(1, max(most, _OFTEN) + 1)
+        needed = next((n for n in runs if apart(n).sigmas >= enough), None)
+        times = needed if needed is not None and needed <= most else 1
+        found.append(_suggested(manoeuvre, drive, times, needed, apart(times), effects))
+    found.sort(key=lambda s: _order(s, enough))
+    sizes: Sizes = "given" if psi is not None else "typical" if fitted is None else "at hand"
+    return NextDrive(effects[0], effects[1:], known.now, enough, sizes, tuple(found), refused)
 
 
-def _with_noise_beside(fit: Fit, first: Effect, size: tuple[float, ...] | None) -> Fit:
-    """The fit with the noise that is left where the first effect acts.
-
-    Without it what it does counts as a disturbance, in which hardly anything would be told apart.
-    """
-    model = fit.model.add(first)
-    found = []
-    for begin in (model, model.with_values(_values(first, size))):
-        with suppress(NumericalError, np.linalg.LinAlgError):
-            found.append(refine(begin, fit.driving, fit.noise))
-    best = max(found, key=lambda f: f.log_likelihood, default=fit)
-    return replace(fit, noise=best.noise) if best.log_likelihood > fit.log_likelihood else fit
+def _asked(fit: Fit, named: Sequence[Effect | str]) -> tuple[Effect, ...]:
+    effects = tuple(fit.model.effect(e) for e in named)
+    if len(effects) < 2:
+        raise InvalidInput(f"'{effects[0].id}' alone: name what it is to be told from too")
+    for i, e in enumerate(effects):
+        if e.id in fit.model.effects:
+            raise InvalidInput(f"the model has '{e.id}' already; give a fit without it")
+        if e.id in (o.id for o in effects[:i]):
+            raise InvalidInput(f"'{e.id}' is named twice; name effects that differ")
+    return effects
 
 
-def _apart(
-    known: Information,
-    a: Effect,
-    b: Effect,
-    size_a: tuple[float, ...] | None,
-) -> float:
-    return min(
-        known.separation(a.id, _size(a, size_a), b.id),
-        known.separation(b.id, _size(b, None), a.id),
-    )
+def _suggested(
+    manoeuvre: Manoeuvre,
+    drive: Drive,
+    times: int,
+    needed: int | None,
+    apart: Apart,
+    effects: Sequence[Effect],
+) -> Suggestion:
+    by_effect = (min(apart.first_acts), *apart.other_acts)
+    if_acts = {e.id: float(square**0.5) for e, square in zip(effects, by_effect, strict=True)}
+    duration_s = drive.log.duration_s
+    return Suggestion(manoeuvre, duration_s, apart.sigmas, drive, times, needed, if_acts)
 
 
-def _size(e: Effect, given: tuple[float, ...] | None) -> tuple[float, ...]:
-    return given if given is not None else tuple(p.typical - p.null_value for p in e.parameters)
+def _order(s: Suggestion, enough: float) -> tuple[float, ...]:
+    """The least to drive first, within the limits and beyond; then what tells most."""
+    if s.sigmas >= enough:
+        return 0.0, s.whole_s
+    if s.needed is not None:
+        return 1.0, s.needed * s.duration_s
+    return 2.0, -round(s.sigmas, 1), -sum(min(v, enough) ** 2 for v in s.if_acts.values())
 
 
-def _values(e: Effect, size: tuple[float, ...] | None) -> dict[str, float]:
-    return {
-        name: float(np.clip(p.null_value + s, p.lower, p.upper))
-        for (name, p), s in zip(e.named.items(), _size(e, size), strict=True)
-    }
+def _as_fitted(car: Model) -> Model:
+    """The same whose driver knows the tyres that were fitted, and steers and drives by them."""
+    tyres = {f"tyre_{axle}": car.tyre(axle) for axle in AXLES}
+    return replace(car, vehicle=car.vehicle.replace(**tyres))
 
 
-def _menu(limits: DriveLimits, length: float) -> list[Manoeuvre]:
-    """Manoeuvres of the library at several speeds and strengths within the limits.
-
-    Circles and rows of cones are as many times those of ordinary cars as the car is.
-    """
-    top, lateral = limits.speed_mps, limits.lateral_mps2
-    slow, fast = 0.5 * top, 0.8 * top
-    menu = [
-        manoeuvres.sine_sweep(speed_mps=v, lateral_mps2=share * lateral, duration_s=t)
-        for v in (slow, fast)
-        for share in (0.35, 0.6)
-        for t in (20.0, 40.0)
-    ]
-    menu += [
-        manoeuvres.step_steer((0.45 * top, 0.65 * top, 0.85 * top), (0.3 * lateral, 0.6 * lateral)),
-        manoeuvres.step_steer((0.45 * top,), (0.4 * lateral, 0.7 * lateral)),
-        manoeuvres.step_steer((0.85 * top,), (0.4 * lateral, 0.7 * lateral)),
-        manoeuvres.ramp_steer((slow,), 0.95 * lateral),
-        manoeuvres.ramp_steer((slow, fast), 0.95 * lateral),
-        manoeuvres.sine_with_dwell(0.6 * top, (0.3 * lateral, 0.5 * lateral, 0.7 * lateral)),
-        manoeuvres.slalom(speed_mps=slow, lateral_mps2=0.65 * lateral, spacing_m=30.0 * length),
-        manoeuvres.brake_in_turn(100.0 * length, 0.6 * lateral),
-        manoeuvres.straight_acceleration(top_speed_mps=top, low_speed_mps=0.3 * top),
-        manoeuvres.lap(lateral_mps2=0.95 * lateral, top_speed_mps=0.95 * top),
-        manoeuvres.handling_course(lateral_mps2=0.95 * lateral, top_speed_mps=0.95 * top),
-    ]
-    menu += [
-        manoeuvres.constant_radius(radius, 0.95 * lateral, 40.0)
-        for radius in (30.0 * length, 60.0 * length, 100.0 * length)
-        if radius * 0.95 * lateral < top**2
-    ]
-    return menu
-
-
-def _driven(
-    truth: Model, manoeuvre: Manoeuvre, fit: Fit, limits: DriveLimits, seed: int
-) -> Drive | None:
-    """The drive with the user's own sensors; None where the limits or the car do not hold."""
-    sensor = dict(zip(MEASURED, fit.noise.sensor, strict=True))
-    steer = max(white_noise_std(log["steer_rad"]) for log in fit.driving.logs)
-    noise = SensorNoise(**{n: float(s) for n, s in sensor.items()}, steer_rad=steer)
+def _driven(car: Model, manoeuvre: Manoeuvre, fit: Fit) -> Drive | None:
+    """The drive without noise, at the rate of the longest log; None where the car is lost."""
     rate = max(fit.driving.logs, key=lambda log: log.duration_s).rate_hz
     try:
-        drive = drive_truth(truth, manoeuvre, seed=seed, noise=noise, rate_hz=rate)
+        return drive_truth(
+            _as_fitted(car), manoeuvre, seed=0, noise=SensorNoise.none(), rate_hz=rate
+        )
     except (NumericalError, InvalidInput):
         return None
-    return drive if limits.hold(drive) else None
 
 
 def _as_logged(drive: Drive, fit: Fit) -> Log:

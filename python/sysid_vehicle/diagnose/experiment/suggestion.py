@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,16 +52,31 @@ class Suggestion:
     ----------
     manoeuvre : Manoeuvre
     duration_s : float
+        Of one drive.
     sigmas : float
         Standard errors between the rivals after it, together with the driving at hand.
     drive : Drive
         The manoeuvre as the model with the first rival drives it.
+    times : int
+        How often it is driven for that.
+    needed : int or None
+        How often it has to be driven to be enough; None: more often than anybody would.
+    if_acts : mapping of str to float
+        The same by which of the rivals acts; for the first one, from the nearest of the others.
     """
 
     manoeuvre: Manoeuvre
     duration_s: float
     sigmas: float
     drive: Drive
+    times: int = 1
+    needed: int | None = None
+    if_acts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def whole_s(self) -> float:
+        """Duration of all that is driven."""
+        return self.times * self.duration_s
 
     @property
     def speed_mps(self) -> tuple[float, float]:
@@ -173,8 +189,9 @@ class Suggestion:
         """Say in one line how it is driven."""
         low, high = self.speed_mps
         speed = f"{low:.0f}" if high - low < 1.0 else f"{low:.0f} to {high:.0f}"
+        often = f"{self.times} times " if self.times > 1 else ""
         parts = [
-            f"{self.duration_s:.0f} s at {speed} m/s",
+            f"{often}{self.duration_s:.0f} s at {speed} m/s",
             f"lateral acceleration up to {self.lateral_mps2:.1f} m/s2",
             f"road wheels up to {np.degrees(self.steer_rad):.1f} deg",
         ]
@@ -189,6 +206,9 @@ class Suggestion:
         return {
             "manoeuvre": self.manoeuvre.name,
             "standard_errors": self.sigmas,
+            "standard_errors_if": dict(self.if_acts),
+            "times": self.times,
+            "times_needed": self.needed,
             "duration_s": self.duration_s,
             "speed_mps": list(self.speed_mps),
             "lateral_mps2": self.lateral_mps2,

@@ -42,19 +42,28 @@ def next_steps(study: Study) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _of_names(study: Study) -> list[str]:
-    found = []
-    told: set[frozenset[str]] = set()
+def open_groups(study: Study) -> tuple[tuple[str, ...], ...]:
+    """Effects that a further drive is to tell apart, in each group the one that was added first."""
+    found: dict[frozenset[str], tuple[str, ...]] = {}
     for a in study.added:
         # Which of two it is that only stands in for something else is no question.
-        alike = frozenset((a.id, *a.confounded_with))
-        if a.confounded_with and a.grade != "alias" and alike not in told:
-            told.add(alike)
-            some = few(a.confounded_with)
-            found.append(
-                f"separate {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
-                "does, or state what is known of them in the vehicle file"
-            )
+        if a.confounded_with and a.grade != "alias":
+            group = (a.id, *a.confounded_with)
+            found.setdefault(frozenset(group), group)
+    return tuple(found.values())
+
+
+def _of_names(study: Study) -> list[str]:
+    found = []
+    for group in open_groups(study):
+        first, *others = group
+        beside = [e for e in study.model.effects if e not in group]
+        also = f" --effects {','.join(beside)}" if beside else ""
+        found.append(
+            f"separate {first} from {few(others)}: `sysid-vehicle next-drive --between "
+            f"{','.join(group)}{also}` or `sv.next_drive(study)` says what to drive, or state what "
+            "is known of them in the vehicle file"
+        )
     aliases = [a for a in study.added if a.stands_in]
     if aliases:
         found.append(

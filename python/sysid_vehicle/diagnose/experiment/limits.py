@@ -1,0 +1,131 @@
+"""What can be driven, and the manoeuvres of the library within it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ... import manoeuvres
+from ..._common.arguments import check_positive
+from ...effects import length_beyond
+from ...errors import InvalidInput
+from ...manoeuvres import Manoeuvre, peak_lateral_mps2
+from ...simulate import Drive
+from ...vehicle import Vehicle
+from .suggestion import ground_m
+
+_SLOWER = (1.0, 0.7, 0.5, 0.35)  # of the speed, where the ground is too small
+_EASIER = (1.0, 0.8, 0.6)  # of the lateral acceleration, where a manoeuvre asks too much
+
+
+@dataclass(frozen=True)
+class DriveLimits:
+    """What can be driven.
+
+    Parameters
+    ----------
+    speed_mps : float
+        Highest speed.
+    lateral_mps2 : float
+        Highest lateral acceleration, either side.
+    area_m : tuple of 2 floats, optional
+        Longer and shorter side of the ground there is.
+    duration_s : float
+        Longest drive.
+    """
+
+    speed_mps: float = 36.0
+    lateral_mps2: float = 8.5
+    area_m: tuple[float, float] | None = None
+    duration_s: float = 120.0
+
+    def __post_init__(self) -> None:
+        limits = {"speed_mps": self.speed_mps, "lateral_mps2": self.lateral_mps2}
+        check_positive("DriveLimits", **limits, duration_s=self.duration_s)
+        if self.area_m is not None and not min(self.area_m) > 0.0:
+            raise InvalidInput(f"area_m is {self.area_m}; give two positive lengths")
+
+    @classmethod
+    def usual(cls, vehicle: Vehicle, **others: Any) -> DriveLimits:
+        """Limits that a car may have: the top speed of a small one goes as the root of its length.
+
+        Parameters
+        ----------
+        vehicle : Vehicle
+            An ordinary one drives up to 36 m/s, and one that is larger is no faster.
+        **others
+            Limits that are known.
+        """
+        length = min(length_beyond(vehicle.wheelbase_m), 1.0)
+        return cls(**{"speed_mps": length**0.5 * cls.speed_mps, **others})
+
+    def hold(self, drive: Drive) -> bool:
+        """Whether a drive stayed within them."""
+        speed, lateral = drive.states[:, 0], drive.outputs[:, 4]
+        inside = (
+            speed.max() <= 1.02 * self.speed_mps
+            and np.abs(lateral).max() <= 1.05 * self.lateral_mps2
+            and drive.log.duration_s <= self.duration_s
+        )
+        if self.area_m is None or not inside:
+            return bool(inside)
+        long, short = ground_m(drive)
+        return long <= max(self.area_m) and short <= min(self.area_m)
+
+
+def menu(limits: DriveLimits, car: Vehicle) -> list[tuple[Manoeuvre, ...]]:
+    """Manoeuvres of the library at several speeds and strengths within the limits.
+
+    Circles and rows of cones are as many times those of ordinary cars as the car is.
+
+    Parameters
+    ----------
+    limits : DriveLimits
+    car : Vehicle
+        Its tyres tell what can be asked of it.
+
+    Returns
+    -------
+    list of tuple of Manoeuvre
+        Each with gentler ones, for a car that does not survive it, or exceeds a limit, and where
+        the ground is limited with slower ones on circles that are smaller accordingly.
+    """
+    lateral = min(limits.lateral_mps2, peak_lateral_mps2(car))
+    length = length_beyond(car.wheelbase_m)
+    several = (
+        _menu(slow * limits.speed_mps, gentle * lateral, slow**2 * length)
+        for slow in (_SLOWER if limits.area_m is not None else _SLOWER[:1])
+        for gentle in _EASIER
+    )
+    return list(zip(*several, strict=True))
+
+
+def _menu(top: float, lateral: float, length: float) -> list[Manoeuvre]:
+    slow, fast = 0.5 * top, 0.8 * top
+    found = [
+        manoeuvres.sine_sweep(speed_mps=v, lateral_mps2=share * lateral, duration_s=t)
+        for v in (slow, fast)
+        for share in (0.35, 0.6)
+        for t in (20.0, 40.0)
+    ]
+    found += [
+        manoeuvres.step_steer((0.45 * top, 0.65 * top, 0.85 * top), (0.3 * lateral, 0.6 * lateral)),
+        manoeuvres.step_steer((0.45 * top,), (0.4 * lateral, 0.7 * lateral)),
+        manoeuvres.step_steer((0.85 * top,), (0.4 * lateral, 0.7 * lateral)),
+        manoeuvres.ramp_steer((slow,), 0.95 * lateral),
+        manoeuvres.ramp_steer((slow, fast), 0.95 * lateral),
+        manoeuvres.sine_with_dwell(0.6 * top, (0.3 * lateral, 0.5 * lateral, 0.7 * lateral)),
+        manoeuvres.slalom(speed_mps=slow, lateral_mps2=0.65 * lateral, spacing_m=30.0 * length),
+        manoeuvres.brake_in_turn(100.0 * length, 0.6 * lateral),
+        manoeuvres.straight_acceleration(top_speed_mps=top, low_speed_mps=0.3 * top),
+        manoeuvres.lap(lateral_mps2=0.95 * lateral, top_speed_mps=0.95 * top),
+        manoeuvres.handling_course(lateral_mps2=0.95 * lateral, top_speed_mps=0.95 * top),
+    ]
+    # A circle that is too wide for the top speed is driven at that.
+    found += [
+        manoeuvres.constant_radius(radius, min(0.95 * lateral, top**2 / radius), 40.0)
+        for radius in (30.0 * length, 60.0 * length, 100.0 * length)
+    ]
+    return found
