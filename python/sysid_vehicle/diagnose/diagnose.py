@@ -104,12 +104,14 @@ def diagnose(
         finished, far = chosen.leading([c for c in ranked if c.p_value < rules.alpha], refits)
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         if refits:
+            finished += chosen.rivals_of_the_best(ranked, finished, far, refits)
+            finished.sort(key=lambda c: -_merit(c, driving.samples))
             finished += chosen.hidden(ranked, finished, left, board)
             on_the_level = chosen.hidden_by_the_road(ranked, [*finished, *far])
             found = {c.id for c in on_the_level}
             finished = [*on_the_level, *(c for c in finished if c.id not in found)]
         finished.sort(key=lambda c: -_merit(c, driving.samples))
-        finished = with_refit_rivals(finished, driving, rules, pool, ends)
+        finished = with_refit_rivals(finished, far, driving, rules, pool, ends)
     done = {c.id for c in finished}
     far = [c for c in far if c.id not in done]
     done |= {c.id for c in far}

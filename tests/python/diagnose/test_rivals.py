@@ -9,6 +9,7 @@ from sysid_vehicle import Fit, Model, diagnose, drive, identify, manoeuvres
 from sysid_vehicle._common.threads import Workers
 from sysid_vehicle.diagnose.candidates.candidate import Candidate
 from sysid_vehicle.diagnose.candidates.refits import finished, refitted
+from sysid_vehicle.diagnose.candidates.refitting import Refitting
 from sysid_vehicle.diagnose.candidates.rivals import with_refit_rivals
 from sysid_vehicle.rules import USUAL
 
@@ -34,7 +35,9 @@ def weighing_the_same(fit: Fit, *names: str) -> list[Candidate]:
 
 def rivals(fit: Fit, *names: str, ends: float = np.inf) -> dict[str, tuple[str, ...]]:
     with Workers(2) as pool:
-        found = with_refit_rivals(weighing_the_same(fit, *names), fit.driving, USUAL, pool, ends)
+        found = with_refit_rivals(
+            weighing_the_same(fit, *names), (), fit.driving, USUAL, pool, ends
+        )
     return {c.id: c.indistinguishable_from for c in found}
 
 
@@ -59,3 +62,24 @@ def test_a_second_name_for_the_same_gain_stays_a_rival(truth: Model, start: Mode
 
 def test_without_time_those_that_gain_as_much_stay_rivals(twice: Fit) -> None:
     assert rivals(twice, "steer_lag", "aero_drag", ends=0.0)["steer_lag"] == ("aero_drag",)
+
+
+def test_a_rival_by_its_score_is_refitted_or_none(twice: Fit) -> None:
+    """The score is of a fit that what is missing has bent."""
+    scored = diagnose(twice, refits=0).ranking
+    others = [c.id for c in scored if c.id != "steer_lag"][:5]
+    lag = next(c for c in scored if c.id == "steer_lag")
+    lag = replace(lag, indistinguishable_from=tuple(others))
+    with Workers(2) as pool:
+        these = Refitting(twice, twice.driving, USUAL, (), pool, np.inf, False)
+        best = finished(twice, refitted(twice, twice.driving, lag))
+        few = these.rivals_of_the_best(scored, [best], (), 2)
+        assert [c.id for c in few] == [c.id for c in scored if c.id in others][:2]
+        assert all(c.finished and c.fit is not None for c in few)
+        left = these.rivals_of_the_best(scored, [best], few, 2)
+        assert not {c.id for c in left} & {c.id for c in few}
+        assert these.rivals_of_the_best(scored, [], (), 2) == []
+        # Neither what is refitted and gains less, nor what is far behind, is a rival any more.
+        told = with_refit_rivals([best, few[0]], few[1:], twice.driving, USUAL, pool, np.inf)
+    assert not {c.id for c in few} & {*told[0].indistinguishable_from}
+    assert {*told[0].indistinguishable_from} == {*others} - {c.id for c in few}

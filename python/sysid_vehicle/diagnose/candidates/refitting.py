@@ -87,6 +87,33 @@ class Refitting:
         shown = with_progress(rest, "refits", total=len(others), shown=self.progress)
         return self._finished([first, *shown])
 
+    def rivals_of_the_best(
+        self,
+        ranked: Sequence[Candidate],
+        known: Sequence[Candidate],
+        far: Sequence[Candidate],
+        most: int,
+    ) -> list[Candidate]:
+        """Refits of what scores say cannot be told from the best one, where there are none.
+
+        Scores are of the fit, which what is missing has bent: the likelihood often tells them
+        apart. Of many such rivals a few are refitted.
+
+        Parameters
+        ----------
+        ranked : sequence of Candidate
+            All of them.
+        known, far : sequence of Candidate
+            Refitted already, the best one first.
+        most : int
+        """
+        done = {c.id for c in (*known, *far)}
+        names = set(known[0].indistinguishable_from) - done if known else set()
+        asked = [c for c in ranked if c.id in names and not _too_fast(c)][:most]
+        work = in_time(lambda c: refitted(self.fit, self.driving, c), self.ends)
+        end = in_time(lambda c: finished(self.fit, c), self.ends)
+        return [c for c in self.pool.map(lambda c: end(work(c)), asked) if c.fit is not None]
+
     def hidden(
         self,
         ranked: Sequence[Candidate],

@@ -36,7 +36,12 @@ def score_rivals(board: ScoreBoard, score: Score, apart: float) -> tuple[str, ..
 
 
 def with_refit_rivals(
-    finished: Sequence[Candidate], driving: Driving, rules: Rules, pool: Workers, ends: float
+    finished: Sequence[Candidate],
+    far: Sequence[Candidate],
+    driving: Driving,
+    rules: Rules,
+    pool: Workers,
+    ends: float,
 ) -> list[Candidate]:
     """Among refitted effects the likelihood itself says which cannot be told apart.
 
@@ -48,6 +53,8 @@ def with_refit_rivals(
     ----------
     finished : sequence of Candidate
         Refitted, with the rivals of their scores.
+    far : sequence of Candidate
+        Refitted too, and too far behind the best ones to be rivals of these.
     driving : Driving
     rules : Rules
     pool : Workers
@@ -64,7 +71,7 @@ def with_refit_rivals(
 
     both = pool.map(told_apart, asked)
     apart = {(one.id, other.id) for (one, other), told in zip(asked, both, strict=True) if told}
-    refitted = {c.id for c in finished}
+    refitted = {c.id for c in (*finished, *far)}
     pairs = [p for p in near if (p[0].id, p[1].id) not in apart]
 
     def rivals(c: Candidate) -> tuple[str, ...]:
