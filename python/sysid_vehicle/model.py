@@ -310,8 +310,7 @@ class Model:
         return self.seated(
             self.effect(e)
             for e in catalogue()
-            if e.id not in self.effects
-            and not e.on_request
+            if not (e.on_request or e.id in self.effects)
             and (not e.refines or {*e.refines} & {*self.effects})
             and not (unknown_inertia and e.id == "yaw_inertia")
         )

@@ -42,8 +42,8 @@ struct YawInertia : Effect {
         .moves = "yaw_rate_radps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
         .confounded_with =
-            "mass, tyre_relaxation, front_tyre_relaxation, rear_tyre_relaxation, "
-            "steer_lag, steer_delay, locked_differential",
+            "mass, tyre_relaxation, front_tyre_relaxation, rear_tyre_relaxation, steer_lag, "
+            "steer_delay, locked_differential, front_roll_steer, rear_roll_steer",
         .parameters = {{.name = "relative_error",
                         .unit = "1",
                         .typical = 0.25,

@@ -21,7 +21,8 @@ struct SteerDelay : Effect {
         .moves = "yaw_rate_radps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
         .confounded_with =
-            "tyre_relaxation, front_tyre_relaxation, steer_lag, yaw_inertia, sensor_delay",
+            "tyre_relaxation, front_tyre_relaxation, steer_lag, yaw_inertia, sensor_delay, "
+            "front_roll_steer",
         .parameters = {{.name = "delay_s",
                         .unit = "s",
                         .typical = 0.04,
@@ -124,7 +125,8 @@ struct SteerLag : Effect {
         .moves = "yaw_rate_radps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
         .confounded_with =
-            "tyre_relaxation, front_tyre_relaxation, steer_delay, yaw_inertia, sensor_delay",
+            "tyre_relaxation, front_tyre_relaxation, steer_delay, yaw_inertia, sensor_delay, "
+            "front_roll_steer",
         .parameters = {{.name = "time_constant_s",
                         .unit = "s",
                         .typical = 0.06,

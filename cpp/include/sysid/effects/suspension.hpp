@@ -107,7 +107,8 @@ struct RollSteer : Effect {
             own.title = "front wheels that steer and lean as the body rolls";
             own.equation = "alpha_f += e s, s'' + 0.7 w s' + w^2 s = w^2 a_y/g, w = 2 pi f";
             own.confounded_with =
-                "tyre_relaxation, front_tyre_relaxation, body_roll, rear_roll_steer";
+                "tyre_relaxation, front_tyre_relaxation, body_roll, rear_roll_steer, steer_lag, "
+                "steer_delay, yaw_inertia";
             own.states[0] = {"roll_at_front", "1"};
             own.states[1] = {"roll_rate_at_front", "1/s"};
         } else {
@@ -115,7 +116,7 @@ struct RollSteer : Effect {
             own.title = "rear wheels that steer and lean as the body rolls";
             own.equation = "alpha_r += e s, s'' + 0.7 w s' + w^2 s = w^2 a_y/g, w = 2 pi f";
             own.confounded_with =
-                "tyre_relaxation, rear_tyre_relaxation, body_roll, front_roll_steer";
+                "tyre_relaxation, rear_tyre_relaxation, body_roll, front_roll_steer, yaw_inertia";
             own.states[0] = {"roll_at_rear", "1"};
             own.states[1] = {"roll_rate_at_rear", "1/s"};
         }
