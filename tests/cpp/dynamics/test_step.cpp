@@ -37,11 +37,12 @@ std::vector<double> convergence(EffectMask effects, const Parameters& p, int sub
 
 TEST(Step, ErrorFallsWithTheFourthPowerAndOfLagsBehindEachOtherWithTheSecond) {
     const EffectMask lags = lagging_effects();
-    const auto motion = convergence(kAllEffects & ~lags, typical_parameters(), 16);
+    const EffectMask roll_steer = mask_of({"front_roll_steer", "rear_roll_steer"});
+    const auto motion = convergence(kAllEffects & ~(lags | roll_steer), typical_parameters(), 16);
     const EffectMask axles = mask_of({"front_tyre_relaxation", "rear_tyre_relaxation"});
     // The rate of roll, in 1/s, multiplies errors of a_y by its frequency; it has a test of its
     // own.
-    const EffectMask roll = mask_of({"body_roll"});
+    const EffectMask roll = mask_of({"body_roll"}) | roll_steer;
     const auto all = convergence(kAllEffects & ~(axles | roll), typical_parameters(), 64);
     const auto twice = convergence(kAllEffects, typical_parameters(), 64);
     for (std::size_t i : {1, 2}) {
@@ -200,7 +201,9 @@ TEST(Step, SettledAuxiliaryStatesStandStill) {
     for (std::size_t i = kMotionStates; i < kModelStates - kUserStates; ++i) {
         EXPECT_NEAR(rate[i], 0.0, 1e-7);
         // A body at rest does not turn.
-        EXPECT_TRUE(std::abs(x[i]) > 1e-4 || i == state_of("body_roll", 1)) << i;
+        const bool turns = i == state_of("body_roll", 1) || i == state_of("front_roll_steer", 1) ||
+                           i == state_of("rear_roll_steer", 1);
+        EXPECT_TRUE(std::abs(x[i]) > 1e-4 || turns) << i;
     }
     EXPECT_EQ(x[0], 25.0);  // the motion is left alone
 }

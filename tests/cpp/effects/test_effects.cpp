@@ -245,7 +245,9 @@ TEST(Catalogue, StatesOfTheirOwn) {
                                                           {"front_tyre_relaxation", 1},
                                                           {"rear_tyre_relaxation", 1},
                                                           {"force_lag", 1},
-                                                          {"body_roll", 2}};
+                                                          {"body_roll", 2},
+                                                          {"front_roll_steer", 2},
+                                                          {"rear_roll_steer", 2}};
         EXPECT_EQ(own, expected.count(id) ? expected.at(id) : 0U) << id;
     }
     EXPECT_EQ(active_states(0).count, 0U);
