@@ -120,24 +120,28 @@ TEST(BodyRoll, IsTheCarOfTheRollAxis) {
 }
 
 TEST(BodyRoll, ErrorFallsWithTheFourthPowerOfTheStep) {
-    const SingleTrack model = rolling();
-    const Parameters p = with_roll(kRoll, 4.0);
-    const auto moved = [&](int parts) {
-        ModelState<double> x{25.0, 0.3, 0.2};
-        x[state_of("body_roll", 0)] = 0.3;
-        x[state_of("body_roll", 1)] = -4.0;
-        advance(model, x, kCalm.data(), {0.02, 1000.0}, {0.05, 3000.0}, p.data(), 0.2, parts);
-        return x;
-    };
-    const auto finest = moved(4000);
-    const auto error = [&](int parts) {
-        const auto x = moved(parts);
-        double most = 0.0;
-        for (std::size_t i = 0; i < kModelStates; ++i)
-            most = std::max(most, std::abs(x[i] - finest[i]));
-        return most;
-    };
-    for (int parts : {8, 16}) EXPECT_GT(error(parts) / error(2 * parts), 13.0);
+    for (const std::string id : {"body_roll", "front_roll_steer", "rear_roll_steer"}) {
+        const SingleTrack model{saloon(), mask_of({id})};
+        Parameters p = plain_parameters();
+        p[parameter_of(id, 0)] = kRoll;
+        p[parameter_of(id, 1)] = 4.0;
+        const auto moved = [&](int parts) {
+            ModelState<double> x{25.0, 0.3, 0.2};
+            x[state_of(id, 0)] = 0.3;
+            x[state_of(id, 1)] = -4.0;
+            advance(model, x, kCalm.data(), {0.02, 1000.0}, {0.05, 3000.0}, p.data(), 0.2, parts);
+            return x;
+        };
+        const auto finest = moved(4000);
+        const auto error = [&](int parts) {
+            const auto x = moved(parts);
+            double most = 0.0;
+            for (std::size_t i = 0; i < kModelStates; ++i)
+                most = std::max(most, std::abs(x[i] - finest[i]));
+            return most;
+        };
+        for (int parts : {8, 16}) EXPECT_GT(error(parts) / error(2 * parts), 13.0) << id;
+    }
 }
 
 TEST(BodyRoll, OneStepASampleIsEnough) {
