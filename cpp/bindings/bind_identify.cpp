@@ -63,6 +63,18 @@ Noise to_noise(const Array& values) {
     return noise;
 }
 
+py::dict as_dict(const Trace& t) {
+    py::dict out;
+    out["innovation"] = copy_of(t.innovation, kChannels);
+    out["spread"] = copy_of(t.spread, kChannels);
+    out["whitened"] = copy_of(t.whitened, kChannels);
+    out["state"] = copy_of(t.state, kStatesFull);
+    out["state_std"] = copy_of(t.state_std, kStatesFull);
+    out["log_density"] = row_of(t.log_density);
+    out["log_likelihood"] = t.log_likelihood;
+    return out;
+}
+
 const double* values_of(const Array& p) { return vector(p, kParameterCount, "parameters"); }
 
 }  // namespace
@@ -152,18 +164,17 @@ void register_identify(py::module_& m) {
             [](const LogwiseProblem& self, const Array& p, const Array& noise, bool smoothed) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
-                const Trace t = unlocked([&] { return trace(self, values, n, smoothed); });
-                py::dict out;
-                out["innovation"] = copy_of(t.innovation, kChannels);
-                out["spread"] = copy_of(t.spread, kChannels);
-                out["whitened"] = copy_of(t.whitened, kChannels);
-                out["state"] = copy_of(t.state, kStatesFull);
-                out["state_std"] = copy_of(t.state_std, kStatesFull);
-                out["log_density"] = row_of(t.log_density);
-                out["log_likelihood"] = t.log_likelihood;
-                return out;
+                return as_dict(unlocked([&] { return trace(self, values, n, smoothed); }));
             },
             py::arg("parameters"), py::arg("noise"), py::arg("smoothed"))
+        .def(
+            "filtered_trace",
+            [](const LogwiseProblem& self, const Array& p, const LogwiseFilter& filter) {
+                check_runs(self, filter);
+                const double* values = values_of(p);
+                return as_dict(unlocked([&] { return trace(self, values, filter); }));
+            },
+            py::arg("parameters"), py::arg("filter"))
         .def(
             "smoothed_means",
             [](const LogwiseProblem& self, const Array& p, const Array& noise) {

@@ -67,6 +67,7 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     at = {"parameters": p, "filter": frozen}
     yield "filtered_noise_score", (known.filtered_noise_score, at)
     yield "filtered_smoothed_means", (known.filtered_smoothed_means, at)
+    yield "filtered_trace", (known.filtered_trace, at)
     yield "residuals", (known.residuals, at)
     yield "half_sum_of_squares", (known.half_sum_of_squares, at)
     yield "sensitivities", (known.sensitivities, {**at, "columns": [0, 3]})

@@ -56,13 +56,14 @@ void freeze_run(const Problem& problem, std::size_t number, const double* p, Fro
 }
 
 /// A filter with room for all samples.
-FrozenFilter empty(const Problem& problem, const Noise& noise) {
+FrozenFilter empty(const Problem& problem, const double* p, const Noise& noise) {
     FrozenFilter filter;
     filter.noise = noise;
     filter.rows = filter_rows(problem.model.effects, noise.disturbances());
     filter.deviations.assign(filter.rows.size(), 0.0);
     filter.runs.resize(problem.runs.size());
     const bool tells = problem.samples() <= kToldSamples;
+    if (tells) filter.made_of = MadeOf(problem, p);
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         for (const Vec<kChannels>& y : problem.runs[i].measurements)
             for (const double v : y) filter.observed += std::isnan(v) ? 0 : 1;
@@ -102,7 +103,7 @@ bool FrozenFilter::tells_of(const Problem& problem) const {
 FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) {
     const InTime in_time(logged, p);
     const Problem& problem = *in_time;
-    FrozenFilter filter = empty(problem, noise);
+    FrozenFilter filter = empty(problem, p, noise);
     const double forgotten_s = forgets_s(problem, noise);
     if (const std::vector<Piece> pieces =
             pieces_of(problem.runs, forgotten_s, filter_samples(problem.model));
@@ -128,7 +129,7 @@ FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) 
         }
     }
     with_state_size(problem.model.effects, noise, [&](auto nx) {
-        filter = empty(problem, noise);
+        filter = empty(problem, p, noise);
         for (std::size_t i = 0; i < problem.runs.size(); ++i)
             freeze_run<decltype(nx)::value>(problem, i, p, filter);
     });

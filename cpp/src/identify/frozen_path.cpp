@@ -21,7 +21,8 @@ class Gains {
   public:
     Gains(const Problem& problem, const FrozenFilter& filter)
         : filter_(filter),
-          places_(filter.places(filter_rows(problem.model.effects, filter.noise.disturbances()))) {
+          places_(filter.places(filter_rows(problem.model.effects, filter.noise.disturbances()))),
+          tells_(filter.tells_of(problem)) {
         std::size_t samples = 0;
         for (const Run& run : problem.runs) {
             first_.push_back(samples);
@@ -80,10 +81,13 @@ class Gains {
     }
     const FrozenFilter& filter() const { return filter_; }
     std::size_t states() const { return places_.size(); }
+    /// Whether the filter told states like those of the path.
+    bool tells() const { return tells_; }
 
   private:
     const FrozenFilter& filter_;
     std::vector<int> places_;
+    bool tells_;
     std::vector<std::size_t> first_;  // sample of each run
 };
 
@@ -150,6 +154,11 @@ class PathWalk {
 
     void begin(const Piece& piece, double* to) const {
         const std::size_t at = piece.begin > 0 ? piece.begin - 1 : 0;
+        if (piece.begin > 0 && gains_.tells()) {
+            // Its parameters were not far from these.
+            std::copy_n(gains_.filter().told(piece.run, at) + kChannels, gains_.states(), to);
+            return;
+        }
         const auto x = initial_state(model_.model(), problem_.runs[piece.run],
                                      model_.parameters(piece.set), at);
         std::fill_n(to, state_.size(), 0.0);
@@ -228,6 +237,27 @@ class PathWalk {
     std::array<const Run*, kLanes> disturbed_{};
 };
 
+/// The path of the parameters that the filter has run with.
+void as_told(const Problem& problem, const FrozenFilter& filter, FrozenPath& path) {
+    const std::size_t n = filter.rows.size();
+    double *white = path.whitened.data(), *predicted = path.predicted.data(),
+           *corrected = path.corrected.data();
+    for (std::size_t i = 0, at = 0; i < problem.runs.size(); ++i)
+        for (std::size_t k = 0; k < problem.runs[i].size(); ++k, ++at) {
+            poll_interrupt(k);
+            const double *error = filter.told(i, k), *mean = error + kChannels;
+            const double* whitener = filter.whitener(i, k);
+            for (std::size_t c = 0; c < kChannels; ++c, ++white) {
+                *white = 0.0;
+                for (std::size_t j = 0; j <= c; ++j) *white += *whitener++ * error[j];
+            }
+            if (path.states == 0) continue;
+            path.parts[at] = filter.runs[i].substeps[k];
+            std::copy_n(mean, n, corrected + at * path.states);
+            filter.predicted(i, k, predicted + at * path.states);
+        }
+}
+
 }  // namespace
 
 void FrozenPath::resize(std::size_t samples, std::size_t states_kept) {
@@ -244,6 +274,10 @@ FrozenPath frozen_path(const Problem& problem, const double* p, const FrozenFilt
     FrozenPath path;
     const std::size_t moved = kMotionStates + active_states(problem.model.effects).count;
     path.resize(problem.samples(), with_states ? moved + kExternals : 0);
+    if (filter.tells_of(problem) && filter.made_of.is(problem, p)) {
+        as_told(problem, filter, path);
+        return path;
+    }
     const double forgotten_s = forgets_s(problem, filter.noise);
     if (const std::vector<Piece> pieces = pieces_of(problem.runs, forgotten_s, kPathSamples);
         !pieces.empty()) {

@@ -50,6 +50,24 @@ double added(const LogwiseProblem& problem, const double* p, std::size_t n, doub
     return sum;
 }
 
+/// One after the other what `work(part, its parameters, its number)` says of the samples.
+template <class Work>
+Trace joined(const LogwiseProblem& problem, const double* p, Work&& work) {
+    Trace all;
+    each(problem, p, [&](const Problem& part, const double* own, std::size_t number, std::size_t) {
+        Trace some = work(part, own, number);
+        if (number == 0) {
+            all = std::move(some);
+            return;
+        }
+        for (auto member : {&Trace::innovation, &Trace::spread, &Trace::whitened,
+                            &Trace::log_density, &Trace::state, &Trace::state_std})
+            (all.*member).insert((all.*member).end(), (some.*member).begin(), (some.*member).end());
+        all.log_likelihood += some.log_likelihood;
+    });
+    return all;
+}
+
 }  // namespace
 
 Problem& LogwiseProblem::shifted(std::vector<double> shift) {
@@ -174,19 +192,15 @@ double noise_score(const LogwiseProblem& logged, const double* p, const LogwiseF
 }
 
 Trace trace(const LogwiseProblem& logged, const double* p, const Noise& noise, bool smoothed) {
-    Trace all;
-    each(logged, p, [&](const Problem& part, const double* own, std::size_t number, std::size_t) {
-        Trace some = trace(part, own, noise, smoothed);
-        if (number == 0) {
-            all = std::move(some);
-            return;
-        }
-        for (auto member : {&Trace::innovation, &Trace::spread, &Trace::whitened,
-                            &Trace::log_density, &Trace::state, &Trace::state_std})
-            (all.*member).insert((all.*member).end(), (some.*member).begin(), (some.*member).end());
-        all.log_likelihood += some.log_likelihood;
+    return joined(logged, p, [&](const Problem& part, const double* own, std::size_t /*number*/) {
+        return trace(part, own, noise, smoothed);
     });
-    return all;
+}
+
+Trace trace(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter) {
+    return joined(logged, p, [&](const Problem& part, const double* own, std::size_t number) {
+        return trace(part, own, filter.parts[number]);
+    });
 }
 
 void smoothed_means(const LogwiseProblem& logged, const double* p, const Noise& noise,

@@ -15,13 +15,8 @@ void ToldPath::linearise(std::size_t run, std::size_t first, std::size_t count) 
     first_ = first;
     for (std::size_t j = 0; j < count; ++j) {
         const std::size_t k = first + j;
-        const double *gain = filter_.gain(run, k), *told = filter_.told(run, k);
         double* here = predicted_.data() + j * n;
-        for (std::size_t a = 0; a < n; ++a) {
-            here[a] = told[kChannels + a];
-            for (std::size_t c = 0; c < kChannels; ++c)
-                here[a] -= gain[a * kChannels + c] * told[c];
-        }
+        filter_.predicted(run, k, here);
         PathSample& s = samples_[j];
         s = {&problem_.runs[run], k, 0, nullptr, nullptr, here, here + moving()};
         if (k == 0) continue;

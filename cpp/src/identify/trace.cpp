@@ -56,6 +56,42 @@ void trace_run(const Problem& problem, const Run& run, const double* p, const No
     for (const auto& s : smooth(steps)) store_state<NX>(system, out, s.mean, s.covariance);
 }
 
+/// What the filter says of a sample, from its gains and what it told.
+void add_told(const FrozenFilter& filter, std::size_t run, std::size_t k, Trace& out) {
+    const std::size_t n = filter.rows.size();
+    const double *error = filter.told(run, k), *mean = error + kChannels, *known = mean + n;
+    Mat<kChannels, kChannels> whitener = Mat<kChannels, kChannels>::Zero();
+    const double* from = filter.whitener(run, k);
+    for (int i = 0; i < kChannels; ++i)
+        for (int j = 0; j <= i; ++j) whitener(i, j) = *from++;
+    const Vec<kChannels> white = whitener * Eigen::Map<const Vec<kChannels>>(error);
+    std::array<bool, kChannels> missing{};
+    for (int i = 0; i < kChannels; ++i) {
+        missing[static_cast<std::size_t>(i)] = whitener(i, i) == 0.0;
+        if (whitener(i, i) == 0.0) whitener(i, i) = 1.0;
+    }
+    const Mat<kChannels, kChannels> lower =
+        whitener.triangularView<Eigen::Lower>().solve(Mat<kChannels, kChannels>::Identity().eval());
+    for (int i = 0; i < kChannels; ++i) {
+        const bool none = missing[static_cast<std::size_t>(i)];
+        out.innovation.push_back(none ? std::nan("") : error[i]);
+        out.spread.push_back(none ? std::nan("") : lower.row(i).norm());
+        out.whitened.push_back(none ? 0.0 : white[i]);
+    }
+    out.log_density.push_back(whitener.diagonal().array().log().sum());
+    const std::size_t begin = out.state.size();
+    for (std::vector<double>* all : {&out.state, &out.state_std}) {
+        all->resize(begin + kStatesFull, std::nan(""));
+        std::fill_n(all->begin() + static_cast<long>(begin), kStatesPlain, 0.0);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto row = static_cast<std::size_t>(filter.rows[i]);
+        if (row >= kStatesFull) continue;
+        out.state[begin + row] = mean[i];
+        out.state_std[begin + row] = std::sqrt(std::max(known[LaneFilter::packed(i, i)], 0.0));
+    }
+}
+
 /// The first sample of each run among all.
 std::vector<std::size_t> first_samples(const Problem& problem) {
     std::vector<std::size_t> first;
@@ -188,6 +224,18 @@ Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smo
         for (const Run& run : problem.runs)
             trace_run<decltype(nx)::value>(problem, run, p, noise, smoothed, out);
     });
+    return out;
+}
+
+Trace trace(const Problem& logged, const double* p, const FrozenFilter& filter) {
+    if (!filter.tells_of(logged)) return trace(logged, p, filter.noise, false);
+    Trace out;
+    out.log_likelihood = filter.log_likelihood;
+    for (std::size_t i = 0; i < logged.runs.size(); ++i)
+        for (std::size_t k = 0; k < logged.runs[i].size(); ++k) {
+            poll_interrupt(k);
+            add_told(filter, i, k, out);
+        }
     return out;
 }
 

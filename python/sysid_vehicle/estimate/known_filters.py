@@ -84,6 +84,12 @@ class KnownProblem(_core.Problem):
                 self._known.put(asked, self.samples, gains)
         return gains
 
+    def trace(self, parameters: FloatArray, noise: FloatArray, smoothed: bool) -> _core._Trace:
+        """Everything the filter, or the smoother, says of each sample."""
+        if smoothed or self.samples > _core.TOLD_SAMPLES:
+            return super().trace(parameters, noise, smoothed)
+        return self.filtered_trace(parameters, self.freeze(parameters, noise))
+
     def smoothed_means(self, parameters: FloatArray, noise: FloatArray) -> FloatArray:
         """The states that the smoother tells, along the filter."""
         if self.samples > _core.TOLD_SAMPLES:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from sysid_vehicle import Driving, InvalidInput, Log, Model, SysidWarning
-from sysid_vehicle.estimate import MEASURED
+from sysid_vehicle import Driving, InvalidInput, Log, Model, SysidWarning, _core
+from sysid_vehicle.estimate import MEASURED, first_guess
 from sysid_vehicle.estimate.samples import thinned
 
 
@@ -133,3 +133,18 @@ def test_a_thinned_problem_keeps_windows_from_everywhere(lap: Log, truth: Model)
     starts = [where.start for _, where, _ in thinned(driving._whole, 1500)]
     assert starts[0] == 0
     assert starts[-1] > 0.6 * driving.samples
+
+
+def test_what_a_filter_told_is_its_trace(
+    short: Log, truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driving = Driving.of(short)
+    p, noise = truth.vector(), first_guess(driving, truth.vehicle).vector()
+    problem = driving.problem(truth)
+    whole = _core.Problem.trace(problem, p, noise, False)
+    gains = problem.freeze(p, noise)
+    monkeypatch.setattr(_core.Problem, "freeze", None)  # it ran already
+    told = driving.problem(truth).trace(p, noise, False)
+    assert told["log_likelihood"] == gains.log_likelihood
+    for name in ("innovation", "spread", "whitened", "log_density", "state", "state_std"):
+        np.testing.assert_allclose(told[name], whole[name], rtol=1e-8, atol=1e-9, err_msg=name)

@@ -23,7 +23,7 @@ CANDIDATES = ["steer_lag", "aero_drag", "rolling_resistance", "yaw_inertia", "gy
 
 KERNELS = (
     *("filtered_noise_score", "freeze", "half_sum_of_squares", "log_likelihoods", "look_ahead"),
-    *("filtered_smoothed_means", "noise_score"),
+    *("filtered_smoothed_means", "filtered_trace", "noise_score"),
     *("normal_equations", "residuals", "sensitivities", "signal_sensitivities", "smoothed_means"),
     "trace",
 )

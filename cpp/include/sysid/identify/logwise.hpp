@@ -52,6 +52,7 @@ double noise_score(const LogwiseProblem& logged, const double* p, const Noise& n
 double noise_score(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter,
                    double* gradient, double* information);
 Trace trace(const LogwiseProblem& logged, const double* p, const Noise& noise, bool smoothed);
+Trace trace(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter);
 void smoothed_means(const LogwiseProblem& logged, const double* p, const Noise& noise, double* out);
 void smoothed_means(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter,
                     double* out);

@@ -8,7 +8,7 @@
 
 #include <vector>
 
-#include "sysid/identify/problem.hpp"
+#include "sysid/identify/made_of.hpp"
 
 namespace sysid {
 
@@ -35,6 +35,7 @@ struct FrozenFilter {
     std::size_t observed = 0;        // measured elements that count
     std::vector<int> rows;           // what has gains, see `filter_rows`
     std::vector<double> deviations;  // of these, the largest at the ends of runs
+    MadeOf made_of;                  // nothing where it does not tell
 
     /// Numbers of one sample.
     std::size_t size() const { return rows.size() * kChannels + kWhitener; }
@@ -58,6 +59,14 @@ struct FrozenFilter {
         return runs[run].told.data() + k * told_size();
     }
     double* told(std::size_t run, std::size_t k) { return runs[run].told.data() + k * told_size(); }
+    /// Means of the states before a sample, which those after it and its innovations tell.
+    void predicted(std::size_t run, std::size_t k, double* to) const {
+        const double *gains = gain(run, k), *error = told(run, k), *mean = error + kChannels;
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            to[i] = mean[i];
+            for (std::size_t c = 0; c < kChannels; ++c) to[i] -= *gains++ * error[c];
+        }
+    }
     bool tells() const { return !runs.empty() && !runs[0].told.empty(); }
     /// Whether what was told is of the states of this problem's model.
     bool tells_of(const Problem& problem) const;
@@ -121,6 +130,9 @@ struct Trace {
 };
 
 Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smoothed);
+
+/// What the filter says, where it has run with these parameters, under its noise.
+Trace trace(const Problem& logged, const double* p, const FrozenFilter& filter);
 
 /// The states that the smoother tells, samples x kStatesFull, without how sure they are: a third of
 /// the work.
