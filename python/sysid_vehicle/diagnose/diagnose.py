@@ -104,9 +104,7 @@ def diagnose(
         finished, far = chosen.leading([c for c in ranked if c.p_value < rules.alpha], refits)
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         if refits:
-            finished += chosen.rivals_of_the_best(ranked, finished, far, refits)
-            finished.sort(key=lambda c: -_merit(c, driving.samples))
-            finished += chosen.hidden(ranked, finished, left, board)
+            finished += chosen.beside_the_leading(ranked, finished, far, refits, left, board)
             on_the_level = chosen.hidden_by_the_road(ranked, [*finished, *far])
             found = {c.id for c in on_the_level}
             finished = [*on_the_level, *(c for c in finished if c.id not in found)]

@@ -8,9 +8,11 @@ import pytest
 from sysid_vehicle import Fit, Model, diagnose, drive, identify, manoeuvres
 from sysid_vehicle._common.threads import Workers
 from sysid_vehicle.diagnose.candidates.candidate import Candidate
-from sysid_vehicle.diagnose.candidates.refits import finished, refitted
+from sysid_vehicle.diagnose.candidates.refits import finished, is_hidden_by_noise, refitted
 from sysid_vehicle.diagnose.candidates.refitting import Refitting
 from sysid_vehicle.diagnose.candidates.rivals import with_refit_rivals
+from sysid_vehicle.diagnose.candidates.score import score_board
+from sysid_vehicle.diagnose.unexplained.omnibus import omnibus
 from sysid_vehicle.rules import USUAL
 
 
@@ -73,12 +75,20 @@ def test_a_rival_by_its_score_is_refitted_or_none(twice: Fit) -> None:
     with Workers(2) as pool:
         these = Refitting(twice, twice.driving, USUAL, (), pool, np.inf, False)
         best = finished(twice, refitted(twice, twice.driving, lag))
-        few = these.rivals_of_the_best(scored, [best], (), 2)
+        left, board = (
+            omnibus(twice, twice.driving),
+            score_board(twice, twice.driving, twice.model.candidates),
+        )
+        found = these.beside_the_leading(scored, [best], (), 2, left, board)
+        assert all(c.finished and c.fit is not None for c in found)
+        few, hidden = found[:2], found[2:]
         assert [c.id for c in few] == [c.id for c in scored if c.id in others][:2]
-        assert all(c.finished and c.fit is not None for c in few)
-        left = these.rivals_of_the_best(scored, [best], few, 2)
-        assert not {c.id for c in left} & {c.id for c in few}
-        assert these.rivals_of_the_best(scored, [], (), 2) == []
+        assert all(is_hidden_by_noise(c.effect) for c in hidden)
+        assert not {c.id for c in hidden} & {c.id for c in few}  # none twice
+        again = these.beside_the_leading(scored, [best], few, 2, left, board)
+        assert not {c.id for c in again} & {c.id for c in few}
+        late = replace(these, ends=0.0)
+        assert late.beside_the_leading(scored, [best], (), 2, left, board) == []
         # Neither what is refitted and gains less, nor what is far behind, is a rival any more.
         told = with_refit_rivals([best, few[0]], few[1:], twice.driving, USUAL, pool, np.inf)
     assert not {c.id for c in few} & {*told[0].indistinguishable_from}

@@ -87,17 +87,16 @@ class Refitting:
         shown = with_progress(rest, "refits", total=len(others), shown=self.progress)
         return self._finished([first, *shown])
 
-    def rivals_of_the_best(
+    def beside_the_leading(
         self,
         ranked: Sequence[Candidate],
         known: Sequence[Candidate],
         far: Sequence[Candidate],
         most: int,
+        left: Omnibus,
+        board: ScoreBoard,
     ) -> list[Candidate]:
-        """Refits of what scores say cannot be told from the best one, where there are none.
-
-        Scores are of the fit, which what is missing has bent: the likelihood often tells them
-        apart. Of many such rivals a few are refitted.
+        """Refits of rivals of the best one, and of what no score shows, all side by side.
 
         Parameters
         ----------
@@ -106,46 +105,46 @@ class Refitting:
         known, far : sequence of Candidate
             Refitted already, the best one first.
         most : int
+            Rivals that are refitted.
+        left : Omnibus
+            Of the fit.
+        board : ScoreBoard
         """
-        done = {c.id for c in (*known, *far)}
-        names = set(known[0].indistinguishable_from) - done if known else set()
-        asked = [c for c in ranked if c.id in names and not _too_fast(c)][:most]
-        work = in_time(lambda c: refitted(self.fit, self.driving, c), self.ends)
+        if time.perf_counter() >= self.ends:
+            return []
+        rivals = _rivals_of_the_best(ranked, known, far, most)
+        hidden, work = self._hidden(ranked, known, left, board)
+        again = in_time(lambda c: refitted(self.fit, self.driving, c), self.ends)
         end = in_time(lambda c: finished(self.fit, c), self.ends)
-        return [c for c in self.pool.map(lambda c: end(work(c)), asked) if c.fit is not None]
+        asked = {c.id for c in rivals}
+        jobs: list[tuple[Callable[[Candidate], Candidate | None], Candidate]] = []
+        jobs += [(lambda c: end(again(c)), c) for c in rivals]
+        jobs += [(work, c) for c in hidden if c.id not in asked]
+        tried = self.pool.map(lambda job: job[0](job[1]), jobs)
+        return [c for c in tried if c is not None and c.fit is not None]
 
-    def hidden(
+    def _hidden(
         self,
         ranked: Sequence[Candidate],
         known: Sequence[Candidate],
         left: Omnibus,
         board: ScoreBoard,
-    ) -> list[Candidate]:
-        """Refits of what noise or tyres that are wrong may hide, from its typical size.
-
-        Parameters
-        ----------
-        ranked : sequence of Candidate
-            All of them.
-        known : sequence of Candidate
-            Refitted already, the best one first.
-        left : Omnibus
-            Of the fit.
-        board : ScoreBoard
-        """
+    ) -> tuple[list[Candidate], Callable[[Candidate], Candidate | None]]:
+        """What noise or tyres that are wrong may hide, and its refit from its typical size."""
+        n, rules = len(ranked), self.rules
         done = {c.id for c in known}
         hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in done]
         hidden += _hidden_by_tyres(ranked, known)
-        if not hidden or time.perf_counter() >= self.ends:
-            return []
-        n, rules = len(ranked), self.rules
-        if self._leaves_more(known[:1], left):
-            work = in_time(lambda c: from_typical(self.fit, c, n, rules.alpha), self.ends)
-            tried = self.pool.map(work, hidden)
-            return [c for c in tried if c.finished and c.p_value < rules.alpha]
-        suspects = _suspected(hidden, known, board, rules)
-        work = in_time(lambda c: from_typical(self.fit, c, n), self.ends)
-        return [c for c in self.pool.map(work, suspects) if c.finished]
+        alpha = rules.alpha if hidden and self._leaves_more(known[:1], left) else np.inf
+        if alpha == np.inf:
+            hidden = _suspected(hidden, known, board, rules)
+        work = in_time(lambda c: from_typical(self.fit, c, n, alpha), self.ends)
+
+        def shown(c: Candidate) -> Candidate | None:
+            tried = work(c)
+            return tried if tried.finished and (tried.p_value < alpha) else None
+
+        return hidden, shown
 
     def hidden_by_the_road(
         self, ranked: Sequence[Candidate], known: Sequence[Candidate]
@@ -229,6 +228,19 @@ def _hidden_by_tyres(ranked: Sequence[Candidate], finished: Sequence[Candidate])
     few = [c for c in ranked if c.id in best.effect.confounded_with and c.effect.along_alone]
     known = {c.id for c in finished}
     return [c for c in few if len(c.effect.parameters) == 1 and c.id not in known]
+
+
+def _rivals_of_the_best(
+    ranked: Sequence[Candidate], known: Sequence[Candidate], far: Sequence[Candidate], most: int
+) -> list[Candidate]:
+    """What scores say cannot be told from the best one, where it has not been refitted.
+
+    Scores are of the fit, which what is missing has bent: the likelihood often tells them apart. Of
+    many such rivals a few are refitted.
+    """
+    done = {c.id for c in (*known, *far)}
+    names = set(known[0].indistinguishable_from) - done if known else set()
+    return [c for c in ranked if c.id in names and not _too_fast(c)][:most]
 
 
 def _suspected(
