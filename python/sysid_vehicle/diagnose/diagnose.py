@@ -18,7 +18,7 @@ from ..rules import USUAL, Rules, bic
 from .candidates.candidate import Candidate
 from .candidates.clocks import shifts
 from .candidates.diagnosis import Diagnosis
-from .candidates.possible import considered
+from .candidates.possible import beside_what_they_refine, considered
 from .candidates.posterior import causes_of
 from .candidates.refitting import Refitting
 from .candidates.rivals import score_rivals, with_refit_rivals
@@ -63,9 +63,10 @@ def diagnose(
     refits : int
         How many of the best to refit; 0 ranks by score alone, and then none is named.
     again : collection of str
-        Effects to refit beside them where there is evidence, such as those whose refits gained much
-        in a poorer model: where a model is wrong in several ways, a refit may gain ten times what
-        the score tells, as the noise that took up the effect is learned anew.
+        Effects to refit beside them where there is evidence, as is done with what refines an effect
+        of the model; such as those whose refits gained much in a poorer model: where a model is
+        wrong in several ways, a refit may gain ten times what the score tells, as the noise that
+        took up the effect is learned anew.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     time_limit_s : float, optional
@@ -81,6 +82,9 @@ def diagnose(
         )
     driving = evident(fit, logs)
     possible = considered(fit.model, candidates)
+    # Whatever leads may stand in for what refines an effect that the model has.
+    finer = beside_what_they_refine((e for e in possible if e.refines), fit.model)
+    again = {*again, *(e.id for e in finer)}
     evidence = Evidence(fit, driving)
     board = score_board_of(evidence, possible, rules, Unknown(evidence), *shifts(evidence))
     left = omnibus_of(evidence, rules, board.projected)

@@ -1,6 +1,7 @@
 """Exact dynamics of candidates whose score shows little of them."""
 
 import sys
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +27,7 @@ from sysid_vehicle.diagnose.candidates.refits import (
     is_hidden_by_noise,
     refitted,
 )
-from sysid_vehicle.diagnose.candidates.refitting import _hidden_by_tyres
+from sysid_vehicle.diagnose.candidates.refitting import Refitting, _hidden_by_tyres
 from sysid_vehicle.effects import catalogue
 from sysid_vehicle.identify import refit, with_exact_inputs
 from sysid_vehicle.identify.search.objective import Objective
@@ -190,3 +191,25 @@ def test_what_the_disturbance_took_over_is_found_in_a_measured_log(
     both = diagnose(fit).ranking[:2]
     assert {c.id for c in both} == {"tyre_relaxation", "rear_tyre_relaxation"}
     assert all(c.finished and c.p_value < 0.01 for c in both)
+
+
+def test_what_refines_an_effect_of_the_model_is_refitted_whatever_leads(
+    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[set[str]] = []
+
+    class Noted(Refitting):
+        def leading(
+            self, significant: Sequence[Candidate], refits: int
+        ) -> tuple[list[Candidate], list[Candidate]]:
+            asked.append({*self.again})
+            return [], []
+
+    monkeypatch.setattr(sys.modules["sysid_vehicle.diagnose.diagnose"], "Refitting", Noted)
+    level = hidden_fit("body_attitude.roll_per_g_rad", 0.06)
+    lean = refit(level.model.add("body_attitude"), level.driving, level.noise)
+    for fit in (level, lean):
+        diagnose(fit, candidates=["aero_drag", "body_roll"], again=["aero_drag"], refits=1)
+    diagnose(lean, refits=1)
+    diagnose(lean, candidates=["aero_drag"], refits=1)
+    assert asked == [{"aero_drag"}, {"aero_drag", "body_roll"}, {"body_roll"}, set()]

@@ -40,24 +40,22 @@ def test_what_is_in_the_model_beside_an_effect_is_no_rival_of_it(
     assert trail.confounded == {"rolling_resistance": ("head_wind",)}
 
 
-def test_what_refines_an_effect_is_a_candidate_beside_it_and_refitted(
+def test_what_refines_an_effect_is_a_candidate_beside_it(
     hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fit = hidden_fit("body_attitude.roll_per_g_rad", 0.06)
     lean = refit(fit.model.add("body_attitude"), fit.driving, fit.noise)
-    asked: list[tuple[list[str], list[str]]] = []
+    asked: list[list[str]] = []
 
-    def noted(
-        of: Fit, *, candidates: Sequence[str | Effect], again: Sequence[str], **__: object
-    ) -> Diagnosis:
-        asked.append(([str(getattr(c, "id", c)) for c in candidates], list(again)))
+    def noted(of: Fit, *, candidates: Sequence[str | Effect], **__: object) -> Diagnosis:
+        asked.append([str(getattr(c, "id", c)) for c in candidates])
         return replace(diagnose(of, candidates=AGAINST, refits=0), ranking=())
 
     monkeypatch.setattr("sysid_vehicle.study.search.search.diagnose", noted)
     one = replace(search(fit, 1), finer=refining())
     one.follow(Trail([fit]))
     one.follow(Trail([fit, lean]))
-    assert asked == [(AGAINST, []), ([*AGAINST, "body_roll"], ["body_roll"])]
+    assert asked == [AGAINST, [*AGAINST, "body_roll"]]
 
 
 def test_what_was_near_the_best_is_refitted_in_the_next_step_too(

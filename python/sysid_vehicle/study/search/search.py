@@ -319,7 +319,6 @@ class Search:
         """All effects scored, some refitted again; where no time is left none is refitted."""
         left = self.ends - time.perf_counter()
         finer = beside_what_they_refine(self.finer, fit.model)
-        again = (*again, *(e.id for e in finer))  # whatever leads: that may stand in for them
         return diagnose(
             fit,
             candidates=(*self.candidates, *finer),
