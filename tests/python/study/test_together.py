@@ -49,10 +49,10 @@ def test_two_are_added_together_where_the_posterior_names_both(truth: Model, sta
     assert found[0] == both
     for name, size in sizes.items():
         assert abs(found[1][name].value - size) < 4.0 * found[1][name].std
-    alike = {e: r.names for e, r in in_place_of(found[1], both, dx).items()}
-    assert alike == {"gyro_bias": (), "steer_ratio": ()}
+    in_place = in_place_of(found[1], both, dx)
+    assert {e: r.names for e, r in in_place.items()} == {"gyro_bias": (), "steer_ratio": ()}
     trail = Trail([fit])
-    trail.note_several(dx, found[0], alike)
+    trail.note_several(dx, found[0], in_place)
     assert set(trail.p_values) == set(both)
     assert max(trail.p_values.values()) < 1e-6
     assert first_together(dx, test, None, 1) is None  # there has to be room for two
@@ -171,8 +171,10 @@ def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(
     assert -USUAL.apart < lead + 0.5 * math.log(found.driving.samples) < USUAL.apart
     assert in_place["road_grade"].better() == ()
     trail = Trail([fit])
-    trail.note_several(dx, both, alike)
+    trail.note_several(dx, both, in_place)
     assert trail.rivals["road_grade"] == ("rolling_resistance",)
+    value, std = trail.sizes["rolling_resistance"]  # in its place, not beside it
+    assert abs(value[0] - 0.02) < 4.0 * std[0] < 0.01
     assert in_place_of(found, both, dx, ends=0.0) == {}  # no time
 
     def unscored(*args: Any) -> SimpleNamespace:

@@ -94,7 +94,8 @@ def judge(
         Of what the final model lacks, where a diagnosis of it has them already; sizes are those of
         refits, of which the noise that was learned without an effect hides nothing.
     refitted : mapping, optional
-        Of rivals, their parameters and standard errors in place of what they cannot be told from.
+        Of rivals, their parameters and standard errors in place of what they cannot be told from;
+        a rival that is not among them has no size.
     settled : bool
         Whether everything worth adding was added. What there is still evidence for is then no
         explanation: with it, driving that no fit saw is not predicted better.
@@ -172,13 +173,11 @@ class _Beside:
         instead = tuple(e for e in self.missing if effect.id in self.groups.get(e, ()))
         if not instead:
             return replace(verdict, finding="proxy", group=self.names)
-        verdict = replace(verdict, finding="one of a group", group=instead)
-        if effect.id not in self.refitted:
-            return verdict
         # Beside its rival it explains nothing: its size is that of the model without it.
-        value, std = self.refitted[effect.id]
-        bound = _within(effect, _reach(effect, value, std, self.rules))
-        return replace(verdict, value=value, std=std, bound=bound)
+        value, std = self.refitted.get(effect.id, ((), ()))
+        bound = bound_of(effect, value, std, self.rules)
+        finding: Finding = "one of a group"
+        return EffectVerdict(effect, finding, value, std, bound, instead)
 
 
 def _all_added(
@@ -250,8 +249,15 @@ def _of_present(
         because = f"the value is physically implausible ({size})"
     elif all(abs(d) + s < p.matters for p, d, s in sizes(effect, value, std, rules)):
         finding, group = "negligible", ()
-    bound = _within(effect, _reach(effect, value, std, rules))
+    bound = bound_of(effect, value, std, rules)
     return EffectVerdict(effect, finding, value, std, bound, group, because)
+
+
+def bound_of(
+    effect: Effect, value: tuple[float, ...], std: tuple[float, ...], rules: Rules
+) -> tuple[float, ...]:
+    """How far from nothing each parameter may be, at 95 %, and within its bounds."""
+    return _within(effect, _reach(effect, value, std, rules))
 
 
 def _reach(

@@ -69,7 +69,8 @@ class EffectVerdict:
         if self.finding == "missing":
             return f"missing; {size}"
         if self.finding == "one of a group":
-            return f"missing; confounded with {rivals} in this driving; {size}"
+            told = f"; {size}" if size else ""
+            return f"missing; confounded with {rivals} in this driving{told}"
         if self.finding == "open" and not rivals:
             return f"significant, not tried yet; {size}"
         if self.finding == "open":

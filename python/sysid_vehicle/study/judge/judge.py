@@ -31,7 +31,7 @@ from ..ahead.own_share import (
 from ..limit import Judging
 from ..results.added import added_by, of_one_step
 from ..results.next_steps import SHORT_S
-from ..results.widened import estimates_of
+from ..results.widened import as_unsure, estimates_of
 from ..search.search import Trail
 from ..search.steps import insignificant, way
 from ..search.together import in_place_of
@@ -157,8 +157,11 @@ class Judge:
         fits, shared = (story, ()) if endless else self._way()
         on_train |= self._compared([f for f in fits if f not in on_train])
         on_test = self._compared(fits, self.test)
-        told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
+        late = tuple(asks.left_out)
         wide = self._wide if decision.verdict in LACKING else None
+        told = in_the_light_of(decision, alone)
+        if wide is not None:
+            told = as_unsure(told, estimates_of(fit, wide), fit, rules)
         idle = before(asks.ends, lambda: useless(fits, self.test, rules), frozenset[str]())
         one = before(asks.ends, self._one_for_all, "")
         return Study(
@@ -277,12 +280,13 @@ class Judge:
             ),
         )
         facts = facts.with_against(told or {})
-        known = self.trail.rivals
-        more = {e: [n for n in r.names if n not in known.get(e, ())] for e, r in in_place.items()}
-        more = {e: names for e, names in more.items() if names and not (told or {}).get(e)}
-        if not more:
+        stands = {e: r for e, r in in_place.items() if r.names and not (told or {}).get(e)}
+        if not stands:
             return alone, facts
-        known |= {e: (*known.get(e, ()), *names) for e, names in more.items()}
+        known = self.trail.rivals
+        known |= {e: tuple(dict.fromkeys((*known.get(e, ()), *stands[e].names))) for e in stands}
+        for r in stands.values():
+            self.trail.sizes.update(r.sizes)
         alone = self._alone(rivals)
         told_again = {v.effect.id: v for v in alone.all}
         added = (

@@ -1,4 +1,4 @@
-"""Estimates of a fit with another covariance."""
+"""Estimates of a fit, and verdicts on its effects, with another covariance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..._common.arrays import FloatArray
+from ...diagnose import EffectVerdict, Verdicts
+from ...diagnose.candidates.judge import bound_of
 from ...identify import Estimate, Fit
+from ...rules import Rules
 
 
 def estimates_of(fit: Fit, covariance: FloatArray | None) -> tuple[Estimate, ...]:
@@ -29,6 +32,38 @@ def estimates_of(fit: Fit, covariance: FloatArray | None) -> tuple[Estimate, ...
         for e, s in zip(fit.estimates, std, strict=True)
     )
     return (*found, *replace(fit, covariance=covariance, estimates=found).derived)
+
+
+def as_unsure(told: Verdicts, wide: Sequence[Estimate], fit: Fit, rules: Rules) -> Verdicts:
+    """Verdicts with the standard errors of wider estimates.
+
+    A rival in the place of an effect is less sure by as many times as the effect is: what acts
+    alike is moved alike by what is missing.
+
+    Parameters
+    ----------
+    told : Verdicts
+    wide : sequence of Estimate
+        Of the fit (`estimates_of`).
+    fit : Fit
+    rules : Rules
+    """
+    by, own = {e.name: e.std for e in wide}, {e.name: e.std for e in fit.estimates}
+    times = {
+        effect.id: max((by[n] / own[n] for n in effect.named if own.get(n, 0.0) > 0.0), default=1.0)
+        for effect in fit.model.parts
+    }
+
+    def wider(v: EffectVerdict) -> EffectVerdict:
+        there = [times[e] for e in (v.effect.id, *v.group) if e in times]
+        if not v.value or not there:
+            return v
+        names, std = v.effect.named, tuple(max(there) * s for s in v.std)
+        if v.effect.id in times:
+            std = tuple(by.get(n, s) for n, s in zip(names, v.std, strict=True))
+        return replace(v, std=std, bound=bound_of(v.effect, v.value, std, rules))
+
+    return Verdicts(tuple(map(wider, told.all)))
 
 
 def times_wider(wide: Sequence[Estimate], fit: Fit) -> float:

@@ -38,7 +38,7 @@ from .steps import (
     lead,
     likeliest,
 )
-from .together import first_together, in_place_of
+from .together import InPlace, first_together, in_place_of
 
 
 @dataclass(eq=False)
@@ -126,19 +126,22 @@ class Trail:
         self.taken_back = tuple(e for e in last if e not in self.fit.model.effects)
 
     def note_several(
-        self, dx: Diagnosis, chosen: Sequence[str], rivals: Mapping[str, Sequence[str]]
+        self, dx: Diagnosis, chosen: Sequence[str], rivals: Mapping[str, InPlace]
     ) -> None:
         """Remember what was chosen together, and what is confounded with each of it.
 
         So by the posterior, and as `in_place_of` finds.
         """
+        self.sizes |= dx.sizes
         for name in chosen:
             self.p_values[name] = dx.family[name]
             shared = dx.proposed.of(name)
             others = () if shared is None else shared.effects
             known = set(dx.family) - set(chosen)
-            alike = dict.fromkeys((*others, *rivals.get(name, ())))
+            in_place = rivals.get(name, InPlace())
+            alike = dict.fromkeys((*others, *in_place.names))
             self.rivals[name] = tuple(e for e in alike if e in known)
+            self.sizes |= in_place.sizes
 
     def note(self, dx: Diagnosis, chosen: Candidate) -> None:
         """Remember what was chosen, and what nearly was."""
@@ -218,8 +221,7 @@ class Search:
                 step = before(self.ends, partial(self._beside_another, dx, trail), None)
             if several is not None:
                 chosen, lean = several
-                rivals = in_place_of(lean, chosen, dx, self.ends)
-                trail.note_several(dx, chosen, {e: r.names for e, r in rivals.items()})
+                trail.note_several(dx, chosen, in_place_of(lean, chosen, dx, self.ends))
             elif step is not None:
                 chosen, lean = (step[0].id,), step[1]
                 trail.note(dx, step[0])

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ..._common.threads import before, in_parallel
-from ...diagnose import Candidate, Diagnosis
+from ...diagnose import Candidate, Diagnosis, Size
 from ...diagnose.candidates.possible import possible_in
 from ...diagnose.candidates.refits import refitted
 from ...diagnose.candidates.reservation import beside
@@ -86,6 +86,11 @@ class InPlace:
     def names(self) -> tuple[str, ...]:
         """Ids of the rivals."""
         return tuple(c.id for c in self.rivals)
+
+    @property
+    def sizes(self) -> dict[str, Size]:
+        """Parameters of the rivals in the effect's place, and their standard errors."""
+        return {c.id: (c.value, c.std) for c in self.rivals}
 
     def better(self, rules: Rules = USUAL) -> tuple[Candidate, ...]:
         """Rivals that are more likely by `Rules.apart`."""
