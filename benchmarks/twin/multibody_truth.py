@@ -170,22 +170,29 @@ def driven(which: str) -> dict[tuple[int, str, int], dict[str, np.ndarray]]:
     return found
 
 
+def logged(
+    case: Other, columns: dict[str, np.ndarray], name: str, rng: np.random.Generator
+) -> sv.Log:
+    """Channels with noise; the logged steering is ahead of the wheels, and times its ratio."""
+    sensors, n = sv.SensorNoise(), len(columns["steer_rad"])
+    columns = {c: values.copy() for c, values in columns.items()}
+    steer = columns["steer_rad"]
+    columns["steer_rad"] = case.ratio * (steer + case.lag_s * np.gradient(steer, 1 / _RATE_HZ))
+    for f in fields(sensors):
+        columns[f.name] += getattr(sensors, f.name) * rng.standard_normal(n)
+    columns["time_s"] = np.arange(n) / _RATE_HZ
+    return sv.Log.from_arrays(columns, name=name, check=False)
+
+
 def improved(name: str, which: str, seed: int) -> sv.Study:
     """Improve the single track on the drives of a set that are fitted; the others judge."""
     case, number = CASES[name], list(CARS)[seed % len(CARS)]
     fitted, judging = SETS[which]
-    sensors, logs = sv.SensorNoise(), []
+    logs = []
     first = list(CASES).index(name) * (len(fitted) + len(judging))
     for i, manoeuvre in enumerate((*fitted, *judging)):
-        columns = {c: values.copy() for c, values in driven(which)[number, name, i].items()}
-        n = len(columns["steer_rad"])
-        steer = columns["steer_rad"]
-        columns["steer_rad"] = case.ratio * (steer + case.lag_s * np.gradient(steer, 1 / _RATE_HZ))
-        rng = np.random.default_rng([seed, first + i])
-        for f in fields(sensors):
-            columns[f.name] += getattr(sensors, f.name) * rng.standard_normal(n)
-        columns["time_s"] = np.arange(n) / _RATE_HZ
-        logs.append(sv.Log.from_arrays(columns, name=manoeuvre.name, check=False))
+        columns = driven(which)[number, name, i]
+        logs.append(logged(case, columns, manoeuvre.name, np.random.default_rng([seed, first + i])))
     train, test = logs[: len(fitted)], logs[len(fitted) :]
     return sv.improve(sv.Model(workshop(number)), train, test, seed=seed)
 
