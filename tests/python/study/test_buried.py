@@ -46,7 +46,7 @@ def test_a_name_stands_by_its_likelihood_where_no_error_shows() -> None:
     assert abs(length.value - LENGTH_M) < 3.0 * length.std
     assert study.verdict == "partly_explained"
     assert study.buried
-    assert "the effects found explain part of it" in study.meaning
+    assert study.meaning.startswith("named: tyre_relaxation; the effects added explain part of it")
     assert "below the noise of the sensors" in study.meaning
     assert contradictions(str(study)) == []
 

@@ -228,7 +228,10 @@ def test_a_part_is_told_with_its_share(study: Study) -> None:
     part = replace(study, verdict="partly_explained", explained=Beyond((1.0, 0.7), 0.3, 0.2, 0.4))
     assert "30 % (20 to 40) of the error 1 to 5 s ahead; the rest is" in part.meaning
     assert part.meaning.startswith(f"named: {study.added[0].name}; the effects added explain 30 %")
-    assert "the effects added explain" not in replace(part, explained=study.explained).meaning
+    little = "s ahead; something else is missing that takes little of it"
+    assert replace(part, explained=study.explained).meaning.endswith(little)
+    unasked = replace(part, explained=None).meaning
+    assert unasked.endswith("the effects added explain part of it; something else is missing")
     # What cannot be told from another is one name.
     one, other = (
         replace(study.added[0], id=e, confounded_with=(f,))

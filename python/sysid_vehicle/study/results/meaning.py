@@ -68,24 +68,24 @@ def _unknown(study: Study) -> str:
 
 
 def _partly_explained(study: Study) -> str:
+    named, taken = _named(study), study.explained
     if study.buried:
         return (
-            "the effects found explain part of it; the errors that remain 0.5 to 5 s ahead are "
-            "below the noise of the sensors"
+            f"{named}the effects added explain part of it; the errors that remain 0.5 to 5 s ahead "
+            "are below the noise of the sensors"
         )
-    taken = study.explained
-    if not taken or not taken.share < study.rules.most:
-        return "the effects found explain part of it; something else is missing"
+    if not taken:
+        return f"{named}the effects added explain part of it; something else is missing"
     part = f"{taken} of the error 1 to 5 s ahead"
     if not taken.low > 0.0 and study.shares.whole.low > 0.0:
         part = (
             f"{study.shares.whole} of what any function of the driving could explain of the error "
             "1 to 5 s ahead"
         )
-    return (
-        f"{_named(study)}the effects added explain {part}; the rest is disturbance, and something "
-        "else that is missing"
-    )
+    rest = "the rest is disturbance, and something else that is missing"
+    if not taken.share < study.rules.most:
+        rest = "something else is missing that takes little of it"
+    return f"{named}the effects added explain {part}; {rest}"
 
 
 def _adequate(study: Study) -> str:
