@@ -26,6 +26,8 @@ _SPREAD = {"mass_kg": 0.15, "jxx_kgm2": 0.15, "jyy_kgm2": 0.2, "jzz_kgm2": 0.2}
 _SPREAD_M = {"cg_x_m": 0.1, "cg_y_m": 0.03, "cg_z_m": 0.1}
 _PRODUCT = 0.03  # of the root of its two moments
 INPUT_SCALE = "input_scale"
+_ESTIMATED, _CONSIDERED, _START = 0.0, 1.0, 2.0  # as the core's binding reads them
+_START_STEP = 0.01  # between the twins, of the standard deviation
 _TORQUES = INPUTS[2:10]
 _ANGULAR = {
     "jxx_kgm2": "roll_rate_radps",
@@ -224,6 +226,13 @@ class SideBySide:
         uncertainty does to the estimates. It costs one twin more. Zero: the inputs are exact.
     uncertain_inputs : sequence of str
         Inputs that have this factor, those of them that the twin takes; not the steering.
+    start_std : float
+        Standard deviation of the first value of a state that is compared, in its unit. Without a
+        gain that corrects it a speed keeps for long where it began, and what the steps to each new
+        guess left in it; either would pass for another mass. So where such a state is compared its
+        start is looked for too; that costs one twin more. Angular rates and ``vy_mps``, which tyres
+        hold, forget their start within a second: they have none. Zero: the twin starts exactly
+        where the car does.
 
     Raises
     ------
@@ -241,6 +250,7 @@ class SideBySide:
     high_pass_hz: Mapping[str, float] = field(default_factory=dict)
     input_std: float = 0.03
     uncertain_inputs: Sequence[str] = _TORQUES
+    start_std: float = 1.0
 
     def __post_init__(self) -> None:
         for u in self.unknowns:
@@ -255,6 +265,8 @@ class SideBySide:
                 )
         if not 0.0 <= self.input_std < 1.0:
             raise InvalidInput(f"input_std = {self.input_std!r}; give a part from 0 to 1")
+        if not 0.0 <= self.start_std < np.inf:
+            raise InvalidInput(f"start_std = {self.start_std!r}; give a number from 0 on")
         if any(name.startswith("steer") for name in self.uncertain_inputs):
             raise InvalidInput("uncertain_inputs: the steering has no factor; leave it out")
 
@@ -274,14 +286,41 @@ class SideBySide:
         scale = Unknown(INPUT_SCALE, deviation, 0.2 * deviation, 1.0 - most, 1.0 + most)
         return (*self.unknowns, scale)
 
+    def starts(self, states: Sequence[str], corrected: Sequence[str] = ()) -> dict[str, float]:
+        """States of a twin whose start is looked for, with the steps between the twins.
+
+        Parameters
+        ----------
+        states : sequence of str
+            Names of its states.
+        corrected : sequence of str
+            Those that gains correct by readings of themselves.
+        """
+        if self.start_std == 0.0:
+            return {}
+        kept = [kept_state(channel) for channel in self.channels]
+        step = _START_STEP * self.start_std
+        return {name: step for name in kept if name in states and name not in corrected}
+
+    def start_steps(
+        self, inputs: Sequence[str], states: Sequence[str], starts: Mapping[str, float]
+    ) -> list[tuple[int, int, float]]:
+        """Of each start: which twin is apart, in which of its states, and how far."""
+        first = 1 + len(self.looked_for(inputs))
+        return [
+            (first + i, list(states).index(name), step)
+            for i, (name, step) in enumerate(starts.items())
+        ]
+
     def core(
         self,
         parameters: Sequence[str],
         channels: Sequence[str],
         dt_s: float,
         inputs: Sequence[str] = (),
+        starts: Mapping[str, float] | None = None,
     ) -> _core.BatchEstimator:
-        """The compiled estimator, for a twin with these parameters, outputs and inputs."""
+        """The compiled estimator, for a twin with these parameters, outputs, inputs and starts."""
         rows = [
             [
                 float(
@@ -294,9 +333,12 @@ class SideBySide:
                 u.walk_per_root_s,
                 u.lower,
                 u.upper,
-                1.0 if u.parameter == INPUT_SCALE else 0.0,
+                _CONSIDERED if u.parameter == INPUT_SCALE else _ESTIMATED,
             ]
             for u in self.looked_for(inputs)
+        ]
+        rows += [
+            [0.0, step, self.start_std, 0.0, 0.0, 0.0, _START] for step in (starts or {}).values()
         ]
         read = [
             [float(place_of(c, channels, "channel")), noise, self.high_pass_hz.get(c, 0.0)]
@@ -327,6 +369,14 @@ def inertia_law(
     value = getattr(around, parameter)
     given: dict[str, object] = {"lower": (1.0 - _LIMIT) * value, "upper": (1.0 + _LIMIT) * value}
     return ParameterLaw(parameter, _ANGULAR[parameter], gain, **{**given, **changes})  # type: ignore[arg-type]
+
+
+def kept_state(channel: str) -> str:
+    """The state that a channel reads and that keeps what it began with; empty if there is none."""
+    if channel.startswith("wheel_speed_"):
+        return "vx_mps"  # wheels roll
+    forgets = channel == "vy_mps" or channel.endswith("_rate_radps")
+    return "" if forgets else channel
 
 
 def place_of(name: str, known: Sequence[str] | Mapping[str, str], what: str) -> int:

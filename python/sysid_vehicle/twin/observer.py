@@ -21,7 +21,7 @@ from .car import LOAD_NAMES, Load, TwinCar
 from .checks import checked_rows, checked_step
 from .drives import INPUTS, OUTPUTS, WHEELS
 from .failing import check_start
-from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, place_of
+from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, kept_state, place_of
 from .readings import READINGS, Readings
 from .residuals import ChannelResidual, Shown, contradictions, residual_of
 
@@ -103,6 +103,15 @@ class Observer:
         batch = () if self.batch is None else self.batch.unknowns
         found = [(u.parameter, u.lower, u.upper) for u in batch]
         return found + [(law.parameter, law.lower, law.upper) for law in self.laws]
+
+    @property
+    def corrected(self) -> list[str]:
+        """States that gains correct by readings of themselves."""
+        return [g.state for g in self.gains if g.gain and g.state == kept_state(g.channel)]
+
+    def starts(self, states: Sequence[str]) -> dict[str, float]:
+        """States of a twin whose start the batch looks for, with the steps between the twins."""
+        return {} if self.batch is None else self.batch.starts(states, self.corrected)
 
     def core_laws(
         self, parameters: Sequence[str], channels: Sequence[str], dt_s: float
@@ -238,7 +247,8 @@ def observe(
     Warns
     -----
     SysidWarning
-        If residuals contradict the estimates, or an estimate stands at its limit.
+        If residuals contradict the estimates, an estimate stands at its limit, or nothing sets a
+        speed that is compared.
     """
     dt = checked_step(readings.dt_s)
     rows = checked_rows(inputs, INPUTS, "inputs", dt)
@@ -254,6 +264,7 @@ def observe(
     if not abs(speed) <= _FASTEST_MPS:
         raise InvalidInput(f"speed_mps = {speed!r}; give a speed up to {_FASTEST_MPS:g} m/s")
     batch = observer.batch
+    starts = observer.starts(STATES)
     try:
         start = twin.rest(speed)
         loads, outputs, stages, spread = _core.observe14(
@@ -264,9 +275,10 @@ def observe(
             dt,
             [g.row(READINGS, STATES) for g in observer.gains],
             observer.core_laws(LOAD_NAMES, READINGS, dt),
-            None if batch is None else batch.core(LOAD_NAMES, READINGS, dt, INPUTS),
+            None if batch is None else batch.core(LOAD_NAMES, READINGS, dt, INPUTS, starts),
             stride,
             [] if batch is None else batch.scaled(INPUTS),
+            [] if batch is None else batch.start_steps(INPUTS, STATES, starts),
         )
     except NumericalError as error:
         raise NumericalError(f"{error}; take smaller gains or a nearer first load") from error
@@ -305,6 +317,7 @@ def judged(
     stages: FloatArray,
     spread: Sequence[float],
     shown: Shown,
+    doubts: Sequence[str] = (),
 ) -> Observation:
     """An observation with what its residuals say of it; a warning where they contradict it.
 
@@ -320,6 +333,8 @@ def judged(
         Of the batch's unknowns, in parts of their first spread.
     shown : Shown
         What is judged: readings of car and twin, at the recorded times or at more of them.
+    doubts : sequence of str
+        What speaks against the estimates whatever the residuals say.
     """
     batch = observer.batch
     unknown = () if batch is None else batch.looked_for(inputs)
@@ -337,7 +352,7 @@ def judged(
     )
     limits = {law.parameter: (law.lower, law.upper) for law in laws}
     limits.update({u.parameter: (u.lower, u.upper) for u in estimated})
-    against = contradictions(residuals, parameters, limits)
+    against = (*doubts, *contradictions(residuals, parameters, limits))
     wide = {}
     for u, s in zip(estimated, spread, strict=False):
         wide[u.parameter] = float(s) * u.spread
@@ -346,7 +361,7 @@ def judged(
         if not u.lower < parameters[u.parameter][-1] < u.upper:
             wide[u.parameter] = max(wide[u.parameter], 0.5 * (u.upper - u.lower))
     if against:
-        warn("the residuals contradict what the twin found: " + "; ".join(against))
+        warn("what the twin found is not to be believed: " + "; ".join(against))
     return Observation(time_s, parameters, outputs, stages, wide, residuals, against)
 
 

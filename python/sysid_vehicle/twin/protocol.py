@@ -25,6 +25,7 @@ from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES
 from .checks import checked_rows, checked_step
 from .failing import all_numbers, blamed_on, check_repeats, check_start
+from .laws import kept_state
 from .observer import Observation, Observer, judged
 from .residuals import Shown
 
@@ -160,6 +161,7 @@ def observe_with(
             {name: shown[:, i] for i, name in enumerate(twin.output_names)},
             dt,
         ),
+        _left_behind(twin, observer),
     )
 
 
@@ -171,15 +173,22 @@ class _Several:
         self._dt = dt
         self._laws = observer.core_laws(self._names, read, dt)
         self._batch, self._scaled, count = None, [], 1
+        steps: list[tuple[int, int, float]] = []
         if observer.batch is not None:
-            self._batch = observer.batch.core(self._names, read, dt, twin.input_names)
+            starts = observer.starts(_settable(twin))
+            self._batch = observer.batch.core(self._names, read, dt, twin.input_names, starts)
             self._scaled = observer.batch.scaled(twin.input_names)
-            count += len(observer.batch.looked_for(twin.input_names))
+            count += len(observer.batch.looked_for(twin.input_names)) + len(starts)
+            steps = observer.batch.start_steps(twin.input_names, _settable(twin), starts)
         known = twin.get_parameters() if "parameters" in twin.capabilities else {}
         self.estimate = [known.get(name, 0.0) for name in self._names]
         self.estimate += [0.0] * (_MOST_PARAMETERS - len(self.estimate)) + [1.0]
         self._gains = [g.row(read, _correctable(twin)) for g in observer.gains]
         self._twins = [twin, *(twin.clone() for _ in range(count - 1))]
+        for which, state, step in steps:
+            start = np.array(self._twins[which].get_state(), dtype=np.float64)
+            start[state] += step
+            self._twins[which].set_state(start)
         self.at_work = twin
         self._has_states = "state" in twin.capabilities
         self._told = np.zeros((count, len(twin.input_names)))
@@ -282,8 +291,24 @@ def _check(twin: Twin, observer: Observer) -> None:
         )
 
 
+def _left_behind(twin: Twin, observer: Observer) -> list[str]:
+    """Compared channels whose state keeps what earlier guesses did to it, as nothing sets it."""
+    if observer.batch is None or "state" in twin.capabilities:
+        return []
+    return [
+        f"{channel}: the twin's speed cannot be set and keeps what earlier guesses did to it; "
+        f"compare ax_mps2 instead, correct vx_mps by a gain, or give the twin 'state'"
+        for channel in observer.batch.channels
+        if kept_state(channel) == "vx_mps" and "vx_mps" not in observer.corrected
+    ]
+
+
+def _settable(twin: Twin) -> tuple[str, ...]:
+    return twin.state_names if "state" in twin.capabilities else ()
+
+
 def _correctable(twin: Twin) -> tuple[str, ...]:
-    return twin.state_names if "state" in twin.capabilities else tuple(_PUSHES)
+    return _settable(twin) if "state" in twin.capabilities else tuple(_PUSHES)
 
 
 def _correct(
