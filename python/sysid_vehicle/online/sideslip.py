@@ -14,13 +14,13 @@ from ..estimate.inputs import white_noise_std
 from ..log import Log
 from ..tyre import Tyre
 from ..vehicle import Vehicle, vehicle_data
-from .sideslip_results import SideslipRun
+from .sideslip_results import SideslipRun, judged_by
 from .sideslip_settings import NOISE_BLOCK, SideslipSettings
 
 #: Kinds of observers, with what each is.
 KINDS: Mapping[str, str] = {
     "dual": "dual UKF with saturating, load-dependent, adapting tyres",
-    "ukf": "UKF of three states with the tyres of the vehicle file",
+    "ukf": "UKF of three states with the tyres of the vehicle file, which it takes as exact",
     "ekf": "the same as an extended Kalman filter",
     "square-root-ukf": "the same as a square-root UKF",
     "linear-ukf": "the UKF with tyres that do not saturate",
@@ -85,6 +85,9 @@ class SideslipObserver:
     covers all of it, their disagreement, and the error of the tyre curve, which no reading tells.
     Little slip teaches less of the stiffness (partial update: Brink, *J. Guid. Control Dyn.* 40,
     2017).
+
+    The standard deviation of the other kinds takes the tyres of the vehicle file as exact; with
+    other tyres, or on another surface, it is far too small. `estimate_sideslip` judges it.
 
     Readings that no car gives, by their size or by how fast they change, are refused: the tyre
     model stands in, and `mode` says so. Steps beyond 0.01 s are divided. After a step of more than
@@ -178,8 +181,14 @@ def estimate_sideslip(
     *,
     kind: str = "dual",
     settings: SideslipSettings | None = None,
+    judge: bool = True,
 ) -> SideslipRun:
     """Estimate sideslip over a whole log; a measured ``vy_mps`` is not looked at.
+
+    Kinds with fixed tyres take them as exact, and no reading tells them otherwise: where the car
+    corners steadily, one sideslip explains any lateral acceleration. So the dual observer, which
+    learns the tyres, is run beside them. By what it knows, the error of another estimate has the
+    mean square of its own variance and the squared distance of both: that is the band.
 
     Parameters
     ----------
@@ -191,6 +200,9 @@ def estimate_sideslip(
         One of :data:`KINDS`.
     settings : SideslipSettings, optional
         If left out, :meth:`SideslipSettings.of` the log.
+    judge : bool
+        Whether the dual observer judges the band of another kind, which takes a hundred times as
+        long. Without it the band is that of tyres that are exact.
 
     Raises
     ------
@@ -202,10 +214,14 @@ def estimate_sideslip(
     Warns
     -----
     SysidWarning
-        If the car is too slow for the observer all the time.
+        If the car is too slow for the observer all the time, or the tyres of the vehicle file do
+        not fit the drive.
     """
     settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
-    return run_over(log, SideslipObserver(vehicle, settings, kind), settings)
+    run = run_over(log, SideslipObserver(vehicle, settings, kind), settings)
+    if kind == "dual" or not judge or run.too_slow:
+        return run
+    return judged_by(run, run_over(log, SideslipObserver(vehicle, settings), settings))
 
 
 def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -> SideslipRun:
@@ -213,24 +229,25 @@ def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -
     sensors = np.column_stack([log[name] for name in _SENSORS])
     dt = np.full(log.n, 1.0 / log.rate_hz)
     found = SideslipEstimate._make(observer.run(dt, sensors).T)
-    if (np.asarray(found.mode) == 1).all():
+    true_beta = true_std = None
+    if log.has("vy_mps"):
+        true_beta = np.arctan2(log["vy_mps"], log["vx_mps"])
+        across = white_noise_std(log["vy_mps"], NOISE_BLOCK)
+        true_std = across / np.maximum(np.hypot(log["vx_mps"], log["vy_mps"]), 1.0)
+    run = SideslipRun(
+        observer.kind, observer.vehicle, log.name, settings, log["time_s"], log["ay_mps2"],
+        true_beta,
+        true_std,
+        **{name: np.ascontiguousarray(column) for name, column in found._asdict().items()},
+    )  # fmt: skip
+    if run.too_slow:
         warn(
             f"{log.name}: vx_mps: reaches {np.nanmax(log['vx_mps']):.3g} m/s, and the observer "
             f"runs from {settings['go_above_mps']:.3g} m/s on: no sideslip was estimated. Give a "
             f"log of driving forwards, check unit and sign of the speed, or lower stop_below_mps "
             f"and go_above_mps of the settings"
         )
-    true_beta = true_std = None
-    if log.has("vy_mps"):
-        true_beta = np.arctan2(log["vy_mps"], log["vx_mps"])
-        across = white_noise_std(log["vy_mps"], NOISE_BLOCK)
-        true_std = across / np.maximum(np.hypot(log["vx_mps"], log["vy_mps"]), 1.0)
-    return SideslipRun(
-        observer.kind, observer.vehicle, log.name, settings, log["time_s"], log["ay_mps2"],
-        true_beta,
-        true_std,
-        **{name: np.ascontiguousarray(column) for name, column in found._asdict().items()},
-    )  # fmt: skip
+    return run
 
 
 def static_stiffness(vehicle: Vehicle) -> tuple[float, float]:

@@ -123,7 +123,9 @@ def calibrate_sideslip(
 
     def tried(x: FloatArray) -> tuple[float, SideslipRun]:
         changed = dict(zip(names, (float(v) for v in np.exp(x)), strict=True))
-        run = estimate_sideslip(vehicle, log, kind=kind, settings=start.replace(**changed))
+        run = estimate_sideslip(
+            vehicle, log, kind=kind, settings=start.replace(**changed), judge=False
+        )
         far = 0.5 * float(np.sum((x - begin) ** 2)) / _SPREAD**2
         return _score(run) - far * _LASTS_S / max(log.duration_s, _LASTS_S), run
 
