@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._common.arrays import FloatArray, as_float64
+from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
@@ -97,6 +98,7 @@ class SideslipObserver:
     Calls from several threads take turns. An observer pickles and copies with its state.
     """
 
+    @typed
     def __init__(
         self,
         vehicle: Vehicle,
@@ -118,6 +120,7 @@ class SideslipObserver:
         else:
             raise InvalidInput(f"kind: '{kind}' is not known; give one of {', '.join(KINDS)}")
 
+    @typed
     def step(
         self,
         dt_s: float,
@@ -139,6 +142,7 @@ class SideslipObserver:
             self._core.step(dt_s, steer_rad, vx_mps, yaw_rate_radps, ax_mps2, ay_mps2)
         )
 
+    @typed
     def run(self, dt_s: FloatArray, sensors: FloatArray) -> FloatArray:
         """Use many samples at once, with the numbers of as many steps.
 
@@ -175,6 +179,7 @@ class SideslipObserver:
         return self._core.samples
 
 
+@typed
 def estimate_sideslip(
     vehicle: Vehicle,
     log: Log,

@@ -11,6 +11,7 @@ import numpy as np
 from .._common.arguments import generator
 from .._common.arrays import FloatArray
 from .._common.printed import Told
+from .._common.typed import typed
 from ..errors import InvalidInput
 from ..export import identified_vehicle
 from ..identify import Fit
@@ -70,6 +71,7 @@ class SideslipCalibration(Told):
         return "\n".join([*lines, "  " + ", ".join(changed)])
 
 
+@typed
 def calibrate_sideslip(
     vehicle: Vehicle,
     log: Log,
@@ -171,6 +173,7 @@ def _log_density(off: FloatArray, std: FloatArray) -> float:
     return float(np.mean(-0.5 * (off / std) ** 2 - np.log(std)) - 0.5 * math.log(2.0 * math.pi))
 
 
+@typed
 def fitted_vehicle(fit: Fit) -> Vehicle:
     """The car of a fit with the tyres, and the yaw inertia, that were found."""
     return identified_vehicle(fit.model)

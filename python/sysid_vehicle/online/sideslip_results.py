@@ -13,6 +13,7 @@ from .._common.arrays import FloatArray
 from .._common.printed import Told
 from .._common.style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
 from .._common.text import number, text_table
+from .._common.typed import typed
 from ..errors import warn
 from ..vehicle import Vehicle
 from .sideslip_settings import SideslipSettings
@@ -311,6 +312,7 @@ def judged_by(run: SideslipRun, dual: SideslipRun) -> SideslipRun:
     )
 
 
+@typed
 def sideslip_overview(run: SideslipRun) -> Figure:
     """Sideslip, cornering stiffness and axle forces over time in one figure."""
     figure = new_figure(9.0, 9.0)

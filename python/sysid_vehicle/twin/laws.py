@@ -16,8 +16,10 @@ from typing import Literal
 import numpy as np
 
 from .. import _core
+from .._common.typed import check_types, typed, typed_fields
 from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES, NOMINAL_SUV, Load
+from .checks import check_apart
 from .drives import INPUTS
 
 # Of the first guess's size: how far the twins stand apart, how wrong the guess may be, limits.
@@ -96,7 +98,9 @@ class ParameterLaw:
     upper: float = float("inf")
     stage: int = 0
 
+    @typed_fields
     def __post_init__(self) -> None:
+        check_types(self)
         if self.gain < 0.0 or self.first_gain < 0.0 or not self.lower < self.upper:
             raise InvalidInput(
                 f"law of {self.parameter}: gains must not be negative and lower must be below upper"
@@ -157,7 +161,11 @@ class Unknown:
     upper: float
     walk_per_root_s: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_types(self)
 
+
+@typed
 def unknowns(*names: str, around: Load = NOMINAL_SUV) -> tuple[Unknown, ...]:
     """Unknowns of a load with customary spreads around a first guess.
 
@@ -252,7 +260,13 @@ class SideBySide:
     uncertain_inputs: Sequence[str] = _TORQUES
     start_std: float = 1.0
 
+    @typed_fields
     def __post_init__(self) -> None:
+        check_apart("unknowns", [u.parameter for u in self.unknowns])
+        check_apart("channels", list(self.channels))
+        for name in ("forgetting", "start_s", "residual_s", "clip", "gentle_s", "start_std"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise InvalidInput(f"{name} = {getattr(self, name)!r}; give a number from 0 on")
         for u in self.unknowns:
             if not (0.0 < u.spread < np.inf and 0.0 < abs(u.apart) < np.inf and u.lower < u.upper):
                 raise InvalidInput(
@@ -265,8 +279,6 @@ class SideBySide:
                 )
         if not 0.0 <= self.input_std < 1.0:
             raise InvalidInput(f"input_std = {self.input_std!r}; give a part from 0 to 1")
-        if not 0.0 <= self.start_std < np.inf:
-            raise InvalidInput(f"start_std = {self.start_std!r}; give a number from 0 on")
         if any(name.startswith("steer") for name in self.uncertain_inputs):
             raise InvalidInput("uncertain_inputs: the steering has no factor; leave it out")
 
@@ -306,11 +318,8 @@ class SideBySide:
         self, inputs: Sequence[str], states: Sequence[str], starts: Mapping[str, float]
     ) -> list[tuple[int, int, float]]:
         """Of each start: which twin is apart, in which of its states, and how far."""
-        first = 1 + len(self.looked_for(inputs))
-        return [
-            (first + i, list(states).index(name), step)
-            for i, (name, step) in enumerate(starts.items())
-        ]
+        steps = enumerate(starts.items(), 1 + len(self.looked_for(inputs)))
+        return [(i, states.index(name), step) for i, (name, step) in steps]
 
     def core(
         self,
@@ -351,6 +360,7 @@ class SideBySide:
             raise InvalidInput(str(error)) from error
 
 
+@typed
 def mass_law(gain: float = 150.0, *, around: Load = NOMINAL_SUV, **changes: object) -> ParameterLaw:
     """The mass by the longitudinal acceleration: eq. (14), with the gate of eq. (24)."""
     given: dict[str, object] = {
@@ -361,6 +371,7 @@ def mass_law(gain: float = 150.0, *, around: Load = NOMINAL_SUV, **changes: obje
     return ParameterLaw("mass_kg", "ax_mps2", gain, **{**given, **changes})  # type: ignore[arg-type]
 
 
+@typed
 def inertia_law(
     parameter: str, gain: float, *, around: Load = NOMINAL_SUV, **changes: object
 ) -> ParameterLaw:

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .. import _core
-from .._common.arguments import whole
+from .._common.arguments import check_positive
 from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Told
 from .._common.style import AFTER, TRUTH, axes_or_new, tidy
+from .._common.typed import check_types, typed
 from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
-from .checks import checked_rows, checked_step
+from .checks import checked_rows, checked_step, checked_stride
 from .drives import INPUTS, OUTPUTS, WHEELS
 from .failing import check_start
 from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, kept_state, place_of
@@ -63,6 +64,9 @@ class StateGain:
     gain: float
     unit: Literal["per_second", "per_sample"] = "per_second"
 
+    def __post_init__(self) -> None:
+        check_types(self)
+
     def row(self, channels: Sequence[str], states: Sequence[str]) -> list[float]:
         """Positions, gain and unit, as the core takes them."""
         return [
@@ -97,12 +101,21 @@ class Observer:
     schedule: Schedule = field(default_factory=Schedule)
     derivative_hz: float = 20.0
 
+    def __post_init__(self) -> None:
+        check_types(self)
+
     @property
     def limits(self) -> list[tuple[str, float, float]]:
         """Parameters that are looked for, with their lower and upper limits."""
         batch = () if self.batch is None else self.batch.unknowns
         found = [(u.parameter, u.lower, u.upper) for u in batch]
         return found + [(law.parameter, law.lower, law.upper) for law in self.laws]
+
+    @property
+    def compared(self) -> list[str]:
+        """Channels of which the readings of car and twin are compared."""
+        channels = [g.channel for g in self.gains] + [law.channel for law in self.laws]
+        return channels + ([] if self.batch is None else list(self.batch.channels))
 
     @property
     def corrected(self) -> list[str]:
@@ -167,15 +180,20 @@ class Observation(Told):
 
     def last(self, name: str, window_s: float = 1.0) -> float:
         """Mean of a parameter over the last seconds."""
-        return float(np.mean(self.parameters[name][self._end(window_s)]))
+        return float(np.mean(self._of(name)[self._end(window_s)]))
 
     def error_percent(self, name: str, truth: float, change: float, window_s: float = 1.0) -> float:
         """Root mean square error over the last seconds in % of the true change.
 
         Eqs. (11) and (12) of Dettu et al. (2023), with the root that (11) lacks.
         """
-        error = self.parameters[name][self._end(window_s)] - truth
+        check_positive("error_percent", change=abs(change))
+        error = self._of(name)[self._end(window_s)] - truth
         return float(100.0 * np.sqrt(np.mean(error**2)) / abs(change))
+
+    def _of(self, name: str) -> FloatArray:
+        place_of(name, list(self.parameters), "parameter")
+        return self.parameters[name]
 
     def _end(self, window_s: float) -> np.ndarray:
         found: np.ndarray = self.time_s > self.time_s[-1] - window_s
@@ -188,7 +206,7 @@ class Observation(Told):
     def plot(self, name: str, *, truth: float | None = None, ax: Axes | None = None) -> Axes:
         """Draw a parameter over time."""
         ax = axes_or_new(ax, 6.0, 3.0)
-        ax.plot(self.time_s, self.parameters[name], color=AFTER, label="estimate")
+        ax.plot(self.time_s, self._of(name), color=AFTER, label="estimate")
         if truth is not None:
             ax.axhline(truth, color=TRUTH, linestyle="--", label="true")
         ax.legend(frameon=False)
@@ -206,6 +224,7 @@ class Observation(Told):
         return "\n".join(lines)
 
 
+@typed
 def observe(
     car: TwinCar,
     load: Load,
@@ -257,7 +276,7 @@ def observe(
         raise InvalidInput(
             f"{len(rows)} rows of inputs but {len(values)} of readings; give equally many"
         )
-    stride = whole(stride, "stride", 1)
+    stride = checked_stride(stride, len(rows))
     check_start(observer.limits, vars(load))
     twin = car.core(load)
     speed = _first_speed(car, readings) if speed_mps is None else float(speed_mps)

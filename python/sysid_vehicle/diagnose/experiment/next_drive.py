@@ -14,6 +14,7 @@ from typing import Any, Literal
 from ..._common.printed import Part, Printed, Table
 from ..._common.progress import with_progress
 from ..._common.text import brief, few
+from ..._common.typed import typed
 from ...effects import Effect
 from ...errors import InvalidInput, NumericalError
 from ...estimate import Driving
@@ -185,6 +186,7 @@ def separations(
     return {(a.id, b.id): apart(a, b) for i, a in enumerate(shown) for b in shown[i + 1 :]}
 
 
+@typed
 @explaining
 def suggest_manoeuvre(
     fit: Fit,
