@@ -107,9 +107,8 @@ class Model:
         for n in (*self.values, *self.settings):
             if n not in known:
                 raise InvalidInput(f"the model has no parameter '{n}'; it has {', '.join(known)}")
-        for n, value in self.values.items():
-            if (number := real(value)) is None or not np.isfinite(number):
-                raise InvalidInput(f"{n} = {value!r}: give a finite number")
+            if real(self.values.get(n, 0.0)) is None:
+                raise InvalidInput(f"{n} = {self.values[n]!r}: give a finite number")
         for name, told in self.settings.items():
             self._check_setting(name, told)
 
@@ -203,8 +202,10 @@ class Model:
         return replace(self, settings=told)
 
     def _check_known(self, name: str) -> None:
+        if not np.isfinite(number := self.value(name)):
+            raise InvalidInput(f"{name} = {number!r}: give a finite number")
         of_tyre = TYRE_RANGES.get(name[0]) if name[1:] in ("_front", "_rear") else None
-        if of_tyre and (wrong := of_tyre.complaint(name, self.value(name))):
+        if of_tyre and (wrong := of_tyre.complaint(name, number)):
             raise InvalidInput(wrong)
 
     def _check_setting(self, name: str, told: Setting) -> None:

@@ -59,7 +59,7 @@ def run(mine: Any = None, **changes: Any) -> Observation:
         (lambda: run(twin(outputs=lambda x, u, p: np.array([1j, 0]))), "gave complex numbers; .*2"),
         (lambda: run(object()), "has no dt_s; give a NativeTwin, a CallableTwin"),
         (lambda: run(observer=3), r"observe_with: observer = 3 \(int\); give an Observer"),
-        (lambda: run(measured=None), "observe_with: measured = None .*give a mapping from a string"),
+        (lambda: run(measured=None), "observe_with: measured = None .*give a mapping"),
         (
             lambda: run(measured={"ax_mps2": np.zeros((N, 1))}),
             r"measured 'ax_mps2' has 40 samples, shape \(40, 1\); .*give shape \(40,\)",
