@@ -317,14 +317,14 @@ def judged(case: Case, **changes: float) -> Result:
     run = estimate_sideslip(
         case.vehicle, case.log, settings=SideslipSettings.of(case.log, **changes)
     )
-    generic_ukf = estimate_sideslip(case.vehicle, case.log, kind="linear-ukf")
+    generic_ukf = estimate_sideslip(case.vehicle, case.log, kind="linear-ukf", judge=False)
     start = np.array([generic_ukf.cf_npr[-1], generic_ukf.cr_npr[-1]])
     tyres = {
         name: getattr(case.vehicle, name).replace(B=getattr(case.vehicle, name).B * factor)
         for name, factor in zip(("tyre_front", "tyre_rear"), target / start, strict=True)
     }
     true_ukf = estimate_sideslip(
-        dataclasses.replace(case.vehicle, **tyres), case.log, kind="linear-ukf"
+        dataclasses.replace(case.vehicle, **tyres), case.log, kind="linear-ukf", judge=False
     )
     now = np.array([run.cf_npr[-1], run.cr_npr[-1]])
     std = np.array([run.cf_std_npr[-1], run.cr_std_npr[-1]])

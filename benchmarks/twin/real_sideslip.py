@@ -132,7 +132,7 @@ def main() -> None:
     true = np.arctan2(log["vy_mps"], log["vx_mps"])
     estimates = {"twin": np.interp(time_s, np.arange(len(mine)) * 10.0 * DT, mine)}
     for kind, name in (("dual", "dual UKF"), ("linear-ukf", "UKF, linear tyres")):
-        estimates[name] = estimate_sideslip(CAR, log, kind=kind).beta_rad
+        estimates[name] = estimate_sideslip(CAR, log, kind=kind, judge=False).beta_rad
     judged = {
         f"after {TRAIN_S:.0f} s, above {MOVING_MPS:g} m/s": (time_s > TRAIN_S)
         & (log["vx_mps"] > MOVING_MPS),

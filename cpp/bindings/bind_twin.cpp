@@ -199,7 +199,8 @@ void register_laws(py::module_& m) {
                          p[3],
                          p[4],
                          p[5],
-                         p[6] != 0.0,
+                         p[6] == 1.0,
+                         p[6] == 2.0,
                      });
                  std::vector<BatchChannel> cs;
                  cs.reserve(channels.size());
@@ -231,11 +232,19 @@ void register_observers(py::module_& m) {
         [](const Vehicle14& twin, const Array& start, const Array& inputs, const Array& measured,
            double dt, const std::vector<std::array<double, 4>>& gains,
            const std::optional<ParameterLaws>& laws, const std::optional<BatchEstimator>& batch,
-           std::size_t stride, const std::vector<std::size_t>& scaled) {
+           std::size_t stride, const std::vector<std::size_t>& scaled,
+           const std::vector<std::array<double, 3>>& starts) {
             const Input14* u = inputs_of(inputs);
             const auto n = inputs.shape(0);
             const double* y = matrix(measured, n, kReadings, "measured");
-            TwinObserverSettings settings{{}, laws, batch, stride, scaled};
+            TwinObserverSettings settings{{}, laws, batch, stride, scaled, {}};
+            const std::size_t twins = batch ? batch->twins() : 1;
+            for (const auto& s : starts)
+                settings.starts.push_back({
+                    place(s[0], twins, "starts: twin"),
+                    place(s[1], kTwinStatesWithTyres, "starts: state"),
+                    s[2],
+                });
             for (const auto& g : gains)
                 settings.gains.push_back({
                     place(g[0], kReadings, "gains: reading"),
@@ -252,7 +261,8 @@ void register_observers(py::module_& m) {
                                   copy_of(seen.readings, kTwinOutputs), seen.stages, seen.spread);
         },
         py::arg("twin"), py::arg("start"), py::arg("inputs"), py::arg("measured"), py::arg("dt"),
-        py::arg("gains"), py::arg("laws"), py::arg("batch"), py::arg("stride"), py::arg("scaled"));
+        py::arg("gains"), py::arg("laws"), py::arg("batch"), py::arg("stride"), py::arg("scaled"),
+        py::arg("starts"));
     m.def(
         "observe_double_track",
         [](const std::array<double, 10>& car, const std::array<double, 8>& front,

@@ -127,6 +127,7 @@ def observe14(
     batch: BatchEstimator | None,
     stride: int,
     scaled: Sequence[int],
+    starts: Sequence[Sequence[float]],
 ) -> tuple[_Array, _Array, list[int], list[float]]: ...
 def observe_double_track(
     car: Sequence[float],

@@ -16,6 +16,7 @@ from . import _core
 from ._common.arguments import pair, real
 from ._common.arrays import FloatArray
 from ._common.text import html_text
+from ._common.typed import typed, typed_fields
 from .effects import Effect, Parameter, base_parameters, catalogue, effect, in_car
 from .errors import InvalidInput
 from .saved import save
@@ -81,6 +82,7 @@ class Model:
     parts: tuple[Effect, ...] = field(default=(), repr=False)
     settings: Mapping[str, Setting] = field(default_factory=dict)
 
+    @typed_fields
     def __post_init__(self) -> None:
         vehicle: object = self.vehicle
         if not isinstance(vehicle, Vehicle):
@@ -102,11 +104,11 @@ class Model:
         object.__setattr__(self, "values", dict(self.values))
         known = self.names
         object.__setattr__(self, "settings", dict(self.settings))
-        for name in (*self.values, *self.settings):
-            if name not in known:
-                raise InvalidInput(
-                    f"the model has no parameter '{name}'; it has {', '.join(known)}"
-                )
+        for n in (*self.values, *self.settings):
+            if n not in known:
+                raise InvalidInput(f"the model has no parameter '{n}'; it has {', '.join(known)}")
+            if real(self.values.get(n, 0.0)) is None:
+                raise InvalidInput(f"{n} = {self.values[n]!r}: give a finite number")
         for name, told in self.settings.items():
             self._check_setting(name, told)
 
@@ -136,6 +138,7 @@ class Model:
         settings = {k: v for k, v in self.settings.items() if k.split(".")[0] not in gone}
         return replace(self, effects=kept, values=values, settings=settings)
 
+    @typed
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The same model with some parameters at other values."""
         return replace(self, values={**self.values, **values})
@@ -199,9 +202,8 @@ class Model:
         return replace(self, settings=told)
 
     def _check_known(self, name: str) -> None:
-        number = real(self.values[name] if name in self.values else self.value(name))
-        if number is None or not np.isfinite(number):
-            raise InvalidInput(f"{name} = {self.values[name]!r}: give a finite number")
+        if not np.isfinite(number := self.value(name)):
+            raise InvalidInput(f"{name} = {number!r}: give a finite number")
         of_tyre = TYRE_RANGES.get(name[0]) if name[1:] in ("_front", "_rear") else None
         if of_tyre and (wrong := of_tyre.complaint(name, number)):
             raise InvalidInput(wrong)
@@ -248,10 +250,8 @@ class Model:
     @property
     def parameters(self) -> dict[str, Parameter]:
         """Parameters by full name, those of the baseline first."""
-        named = {p.name: p for p in base_parameters()}
-        for e in self.parts:
-            named.update(e.named)
-        return named
+        own = {name: p for e in self.parts for name, p in e.named.items()}
+        return {p.name: p for p in base_parameters()} | own
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from ._common.files import as_path, write_bytes
+from ._common.typed import typed
 from ._core import __version__
 from .effects import Effect, effect
 from .errors import InvalidInput
@@ -137,6 +138,7 @@ def fingerprint(result: object) -> str:
     return held.hexdigest()
 
 
+@typed
 def load(path: str | Path) -> Any:
     """Read what :func:`save` or a method ``save`` wrote.
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ._common.arguments import real
 from ._common.arrays import FloatArray
 from ._common.files import refuse_unknown
+from ._common.typed import typed_fields
 from .errors import InvalidInput
 
 _CURVE_POINTS = 3001
@@ -90,6 +91,7 @@ class Tyre:
     D: float = 1.0
     E: float = 0.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_ranges(TYRE_RANGES, dataclasses.asdict(self), "tyre")
         for key in TYRE_RANGES:

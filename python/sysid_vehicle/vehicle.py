@@ -16,6 +16,7 @@ import numpy.typing as npt
 from . import _core
 from ._common.arrays import FloatArray
 from ._common.files import as_path, read_toml, refuse_unknown, write_text
+from ._common.typed import typed, typed_fields
 from .errors import InvalidInput, warn
 from .tyre import TYRE_RANGES, USUAL_TYRE, Range, Tyre, check_ranges
 
@@ -110,6 +111,7 @@ class Vehicle:
     air_density_kgpm3: float = 1.225
     name: str = "vehicle"
 
+    @typed_fields
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise InvalidInput(f"vehicle: name = {self.name!r} is not a text")
@@ -165,6 +167,7 @@ class Vehicle:
         return dataclasses.replace(self, **changes)
 
     @classmethod
+    @typed
     def from_toml(cls, path: str | Path) -> Vehicle:
         """Read a vehicle file.
 

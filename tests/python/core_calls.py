@@ -296,6 +296,7 @@ def twin(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
         "gains": [[0.0, 0.0, 1.0, 0.0]],
         "stride": 5,
         "scaled": [2, 3],
+        "starts": [[1.0, 6.0, 0.1]],
         "law_parameter": 0,
         "law_channel": 1,
         "yaw_rate_channel": 2,

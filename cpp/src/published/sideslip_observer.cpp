@@ -23,9 +23,10 @@ const SideslipEstimate& PublishedDual::step(double dt, const SensorSample& s) {
     for (std::size_t i = 0; i < readings.size(); ++i) {
         const SensorRange& range = kSensorRanges[i];
         if (std::isnan(readings[i]))
-            throw NumericalFailure(std::string("the published observer needs every sensor, and ") +
-                                       range.channel + " is missing",
-                                   index_);
+            throw NumericalFailure(
+                std::string("the published observer needs every sensor, and ") + range.channel +
+                    " is missing: leave the sample out, or take the dual observer",
+                index_);
         if (std::abs(readings[i]) > range.most)
             throw NumericalFailure(std::string(range.channel) + " = " + shown(readings[i]) +
                                        " is beyond what a car does (" + shown(range.most) +

@@ -22,7 +22,8 @@ BatchEstimator::BatchEstimator(std::vector<BatchParameter> parameters,
       settings_(settings),
       dt_(dt) {
     for (const BatchParameter& p : parameters_) {
-        if (p.parameter < 0 || p.parameter >= static_cast<int>(kEstimates))
+        const bool known = p.parameter >= 0 && p.parameter < static_cast<int>(kEstimates);
+        if (!known && !p.start)
             throw std::invalid_argument("batch: parameter " + std::to_string(p.parameter) +
                                         " is not one of " + std::to_string(kEstimates));
         const bool good = std::isfinite(p.step) && p.step != 0.0 && std::isfinite(p.spread) &&
@@ -82,7 +83,7 @@ Estimates BatchEstimator::of_twin(std::size_t which, const Estimates& estimate) 
     if (which > parameters_.size())
         throw std::out_of_range("twin " + std::to_string(which) + ": there are " +
                                 std::to_string(twins()) + ", counted from 0");
-    if (which > 0) {
+    if (which > 0 && !parameters_[which - 1].start) {
         const BatchParameter& p = parameters_[which - 1];
         v[static_cast<std::size_t>(p.parameter)] += p.step;
     }
@@ -175,11 +176,15 @@ void BatchEstimator::learn(std::size_t channel, double error, double variance,
     leaning_ -= gain_ * slope_.dot(leaning_);
     for (std::size_t j = 0; j < parameters_.size(); ++j) {
         const BatchParameter& p = parameters_[j];
-        double& value = estimate[static_cast<std::size_t>(p.parameter)];
-        const double before = value;
-        value = std::clamp(value + gain_[at(j)] * error * p.spread, p.lower, p.upper);
-        const double moved = (value - before) / p.spread;
-        moved_[at(j)] += (value - before) / p.step;
+        double change = gain_[at(j)] * error * p.spread;
+        if (!p.start) {
+            double& value = estimate[static_cast<std::size_t>(p.parameter)];
+            const double before = value;
+            value = std::clamp(value + change, p.lower, p.upper);
+            change = value - before;
+        }
+        const double moved = change / p.spread;
+        moved_[at(j)] += change / p.step;
         for (std::size_t d = channel + 1; d < channels_.size(); ++d)
             residual_[at(d)] -= slopes_(at(d), at(j)) * moved;
     }

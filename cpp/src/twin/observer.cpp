@@ -39,6 +39,11 @@ void check(const TwinObserverSettings& settings, double dt) {
     }
     if (settings.laws) within(settings.laws->readings() - 1, kReadings, "laws: reading");
     if (settings.batch) within(settings.batch->readings(), kReadings + 1, "batch: reading");
+    const std::size_t twins = settings.batch ? settings.batch->twins() : 1;
+    for (const StartStep& s : settings.starts) {
+        within(s.twin, twins, "starts: twin");
+        within(s.state, kTwinStatesWithTyres, "starts: state");
+    }
     for (const std::size_t place : settings.scaled) {
         within(place, kTwinInputs, "scaled: input");
         if (place < 2) throw std::invalid_argument("scaled: the steering has no scale");
@@ -91,6 +96,7 @@ Observation observe14(const Vehicle14& twin, const State14& start, const Input14
     };
     if (settings.batch)
         for (std::size_t t = 0; t < count; ++t) put(t, 0);
+    for (const StartStep& s : settings.starts) states[s.twin][s.state] += s.step;
     Observation seen;
     for (std::size_t k = 0; k < n; ++k) {
         poll_interrupt(k);

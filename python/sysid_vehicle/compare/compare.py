@@ -12,6 +12,7 @@ from .._common.arrays import FloatArray
 from .._common.style import axes_or_new
 from .._common.tables import dataset, frame
 from .._common.text import brief, html_list, html_paragraph, html_table, number, text_table
+from .._common.typed import typed
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..estimate.pieces import traces
 from ..identify import Fit, driving_beside, driving_of, explaining
@@ -199,6 +200,7 @@ def _told(
         yield own, squares, there.sum(axis=1), trace
 
 
+@typed
 @explaining
 def compare(
     fit: Fit, logs: Log | Sequence[Log] | Driving, *, noise: NoiseModel | None = None

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from .._common.arguments import duration
 from .._common.threads import Workers
+from .._common.typed import typed
 from ..compare import one_step_error
 from ..effects import Effect
 from ..errors import InvalidInput
@@ -29,6 +30,7 @@ from .unexplained.omnibus import Unknown, omnibus_of
 REFITS = 5
 
 
+@typed
 @explaining
 def diagnose(
     fit: Fit,

@@ -16,6 +16,7 @@ from .. import _core
 from .._common.arguments import expect
 from .._common.arrays import FloatArray, as_float64
 from .._common.text import html_text
+from .._common.typed import typed, typed_fields
 from ..errors import InvalidInput, near_names
 from . import plugins
 
@@ -164,6 +165,7 @@ class Effect:
     channels: tuple[str, ...] = ()
     own_states: tuple[OwnState, ...] = ()
 
+    @typed_fields
     def __post_init__(self) -> None:
         # Before any problem is made for it: its runs hold the channels by number.
         for name in self.channels:
@@ -352,6 +354,7 @@ def forget(name: str) -> None:
     del _users[name]
 
 
+@typed
 def effect(name: str | Effect) -> Effect:
     """The effect with this id.
 

@@ -310,7 +310,7 @@ def trace(
     ------
     InvalidInput
         The function reads a signal the model does not know yet at this place, decides by values,
-        or calls what cannot be followed.
+        calls what cannot be followed, or fails otherwise.
     """
     tape = _Tape()
     known = _KNOWN[target]
@@ -329,6 +329,11 @@ def trace(
         ) from e
     except InvalidInput as e:
         raise InvalidInput(f"{what}: {e}") from e
+    except Exception as e:
+        raise InvalidInput(
+            f"{what}: the function fails ({type(e).__name__}: {e}); give one of two arguments, "
+            f"signals and parameters"
+        ) from e
     if not isinstance(result, Traced) and target in (EVERYTHING, OUTSET):
         result = Traced(tape, 0, "")._of(result)
     if not isinstance(result, Traced):

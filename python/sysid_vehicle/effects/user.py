@@ -8,6 +8,7 @@ import runpy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from .._common.typed import typed
 from ..errors import InvalidInput
 from . import plugins
 from .catalogue import Effect, OwnState, Parameter, catalogue, effect, forget, register
@@ -25,6 +26,7 @@ _MOVES = {
 _NEEDS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ay_mps2")
 
 
+@typed
 def parameter(
     name: str,
     unit: str,
@@ -103,6 +105,7 @@ def parameter(
     return made
 
 
+@typed
 def state(
     name: str,
     unit: str,
@@ -141,6 +144,7 @@ def _constant(value: float) -> Function:
     return lambda _d, _p: value
 
 
+@typed
 def define_effect(
     id: str,
     *,
@@ -278,6 +282,7 @@ def define_effect(
     return register(made)
 
 
+@typed
 def forget_effect(id: str) -> None:
     """Remove an effect of your own.
 
@@ -289,6 +294,7 @@ def forget_effect(id: str) -> None:
     forget(id)
 
 
+@typed
 def load_effects(path: str | Path) -> tuple[Effect, ...]:
     """Run a Python file that defines effects, and give those it defined.
 

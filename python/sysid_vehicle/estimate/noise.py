@@ -14,6 +14,7 @@ import scipy
 from .._common.arrays import FloatArray, as_float64
 from .._common.text import html_text
 from .._common.threads import check_time
+from .._common.typed import typed_fields
 from ..errors import NumericalError
 from ..log import MEASURED
 from ..vehicle import GRAVITY_MPS2, Vehicle
@@ -66,6 +67,7 @@ class NoiseModel:
     road: tuple[float, ...] = (0.0, 0.0)
     road_time_s: float = 5.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         given: object = self.correlation_time_s
         if isinstance(given, int | float):  # as in files of earlier versions

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from .._common.arguments import expect
 from .._common.files import as_path, write_bytes, write_text
+from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..identify import Fit
 from ..model import Model
@@ -27,6 +28,7 @@ __all__ = [
 _SUFFIXES = ".py, .hpp, .h, .fmu, .tir or .toml"
 
 
+@typed
 def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
     """Write a model for use elsewhere; the ending of the name says as what.
 

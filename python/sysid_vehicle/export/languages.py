@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .._common.arguments import expect
+from .._common.typed import typed
 from .._core import __version__
 from ..errors import InvalidInput
 from ..model import Model
@@ -182,6 +183,7 @@ inline State step(State state, const std::array<double, 2>& before,
 """
 
 
+@typed
 def casadi_function(model: Model) -> Any:
     """Return the model as a function of CasADi.
 

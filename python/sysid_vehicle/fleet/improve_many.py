@@ -14,6 +14,7 @@ from .._common.arguments import expect, whole
 from .._common.files import as_path, write_text
 from .._common.progress import with_progress
 from .._common.threads import cores
+from .._common.typed import typed
 from ..errors import SysidError, warn
 from ..read import ChannelMap
 from .jobs import Car, Drive, Job, check_options, jobs_of
@@ -26,6 +27,7 @@ from .work import Outcome, do, failed
 _SUMMARY_EVERY_S = 2.0
 
 
+@typed
 def improve_many(
     cars: Car | Mapping[str, Car],
     logs: Mapping[str, Drive | Sequence[Drive]] | Sequence[Drive | Sequence[Drive]],

@@ -22,7 +22,7 @@ Car = Vehicle | Model | str | Path
 Drive = Log | str | Path
 Options = Mapping[str, Any]
 
-_OURS = ("model", "train", "test", "sensors", "workers", "progress", "tell")
+_OURS = ("model", "train", "test", "workers", "progress", "tell")
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,8 @@ def jobs_of(
     refuse_unknown(kept_apart, named, "validation")
     models = {n: model_of(c) for n, c in cars.items()} if isinstance(cars, Mapping) else {}
     one = None if isinstance(cars, Mapping) else model_of(cars)
-    jobs = []
+    jobs: list[Job] = []
+    check_apart(named, "improve_many")
     for name, drives in named.items():
         check_name(name)
         model = one or models.get(name) or models.get(name.partition("/")[0])
@@ -151,6 +152,24 @@ def check_name(name: object) -> None:
         )
 
 
+def check_apart(names: Iterable[object], where: str) -> None:
+    """Refuse names that come twice, also those that some disks hold for the same.
+
+    Raises
+    ------
+    InvalidInput
+        As it says.
+    """
+    files: dict[str, object] = {}
+    for name in names:
+        file = str(name).casefold()
+        if file in files:
+            twice = f"two studies are called '{name}'"
+            alike = f"'{files[file]}' and '{name}' are one file on some disks"
+            raise InvalidInput(f"{where}: {twice if files[file] == name else alike}; rename one")
+        files[file] = name
+
+
 def check_options(options: Options, where: str) -> None:
     """Refuse what is no argument of `improve` that can be chosen here.
 
@@ -161,6 +180,11 @@ def check_options(options: Options, where: str) -> None:
     """
     known = [p for p in signature(improve).parameters if p not in _OURS]
     refuse_unknown(options, known, where)
+    if options.get("sensors") is not None and options["sensors"] is not False:
+        raise InvalidInput(
+            f"{where}: sensors: each study checks the sensors of its own logs; give False to leave "
+            f"logs as they are"
+        )
 
 
 def _named(logs: Sequence[Drive | Sequence[Drive]]) -> dict[str, Drive | Sequence[Drive]]:

@@ -11,7 +11,7 @@ from .._common.files import as_path, read_toml, refuse_unknown
 from ..errors import InvalidInput
 from ..model import Model
 from ..read import ChannelMap
-from .jobs import Job, check_name, check_options, model_of
+from .jobs import Job, check_apart, check_name, check_options, model_of
 
 _FILES = ("vehicle", "channels", "dbc")
 _SHARED = (*_FILES, "nuisances")
@@ -49,10 +49,7 @@ def manifest_jobs(path: str | Path) -> list[Job]:
     jobs = [_job(path, i, e, define, options) for i, e in enumerate(entries, start=1)]
     if not jobs:
         raise InvalidInput(f'{path}: it names no log; give logs = "*.csv", or [[study]] tables')
-    names = [job.name for job in jobs]
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidInput(f"{path}: two studies are called '{name}'; rename one")
+    check_apart([job.name for job in jobs], str(path))
     return jobs
 
 
@@ -112,8 +109,9 @@ def _matches(manifest: Path, pattern: str) -> list[tuple[str, Path]]:
     """Files that match, and their names: what follows the last folder without a wildcard."""
     folders = Path(pattern).parts[:-1]
     fixed = next((i for i, p in enumerate(folders) if re.search(r"[*?\[]", p)), len(folders))
-    root = manifest.parent.absolute().joinpath(*folders[:fixed])
-    found = sorted(glob.glob(str(manifest.parent.absolute() / pattern), recursive=True))
+    here = manifest.parent.absolute()  # its name may hold what is a wildcard in a pattern
+    root = here.joinpath(*folders[:fixed])
+    found = sorted(here / p for p in glob.glob(pattern, root_dir=here, recursive=True))
     if not found:
         raise InvalidInput(f"{manifest}: no file matches logs = '{pattern}'; correct the path")
-    return [(Path(p).relative_to(root).with_suffix("").as_posix(), Path(p)) for p in found]
+    return [(p.relative_to(root).with_suffix("").as_posix(), p) for p in found]

@@ -14,6 +14,7 @@ import numpy as np
 from .._common.arguments import expect, real, whole
 from .._common.arrays import FloatArray, as_float64
 from .._common.progress import doing
+from .._common.typed import typed
 from ..errors import InvalidInput
 from ..log import Log, several_logs
 from ..sensors import SensorCheck, check
@@ -31,6 +32,7 @@ class _Forces:
     moment_nm: FloatArray
 
 
+@typed
 @doing("axle forces")
 def axle_forces(
     logs: Log | Sequence[Log],

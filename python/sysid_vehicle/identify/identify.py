@@ -12,6 +12,7 @@ import numpy as np
 from .._common.arrays import FloatArray, as_float64
 from .._common.text import few
 from .._common.threads import before
+from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate import Driving, NoiseModel, first_guess
 from ..log import LEAST_USABLE_S, Log, check_car, check_excitation, copies
@@ -42,6 +43,7 @@ _STARTED = 0.3  # of the time that a search has, for its starts
 _OFFSETS = 2  # times that offsets of logs are found, and noise of other time scales is tried
 
 
+@typed
 @explaining
 def identify(
     model: Model,

@@ -14,6 +14,7 @@ from .._common.arrays import FloatArray, filled
 from .._common.files import write_text
 from .._common.tables import dataset, frame
 from .._common.text import html_paragraph, html_table
+from .._common.typed import typed
 from ..errors import InvalidInput, near_names
 from ..vehicle import Vehicle
 from .build import LEAST_STRETCH_S, build
@@ -78,6 +79,7 @@ class Log:
     retimed: tuple[Retimed, ...] = ()
 
     @classmethod
+    @typed
     def from_arrays(
         cls,
         data: Columns,
@@ -183,6 +185,7 @@ class Log:
     def __len__(self) -> int:
         return self.n
 
+    @typed
     def between(self, t0: float, t1: float) -> Log:
         """Return the part with ``t0 <= time_s <= t1``; time keeps its origin.
 

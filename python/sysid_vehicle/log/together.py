@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._common.arguments import expect
+from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from .checks import excitation_note
 from .log import Log
@@ -30,6 +31,7 @@ def several_logs(logs: Log | Sequence[Log], function: str = "driving") -> tuple[
     return found
 
 
+@typed
 def check_excitation(logs: Log | Sequence[Log]) -> bool:
     """Warn if none of the runs holds corners, so that lateral parameters cannot be determined.
 

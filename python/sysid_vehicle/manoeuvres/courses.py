@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .._common.arguments import check_positive
+from .._common.typed import typed
 from .curves import Knots
 from .manoeuvre import Manoeuvre
 
@@ -123,6 +124,7 @@ def _course(
     )
 
 
+@typed
 def lap(
     duration_s: float = 60.0, lateral_mps2: float = 9.2, top_speed_mps: float = 34.0
 ) -> Manoeuvre:
@@ -147,6 +149,7 @@ def lap(
     )
 
 
+@typed
 def handling_course(
     duration_s: float = 60.0, lateral_mps2: float = 8.5, top_speed_mps: float = 34.5
 ) -> Manoeuvre:

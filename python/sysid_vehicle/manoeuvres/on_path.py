@@ -6,11 +6,13 @@ import math
 from collections.abc import Sequence
 
 from .._common.arguments import check_positive
+from .._common.typed import typed
 from ..errors import InvalidInput
 from .curves import Curvature, Knots, Pulse, Pulses, Sweep, constant
 from .manoeuvre import Manoeuvre
 
 
+@typed
 def slalom(
     duration_s: float = 30.0,
     speed_mps: float = 18.0,
@@ -43,6 +45,7 @@ def slalom(
     )
 
 
+@typed
 def double_lane_change(
     speeds_mps: Sequence[float] = (17.0, 21.0, 25.0),
     offset_m: float = 3.5,
@@ -99,6 +102,7 @@ def double_lane_change(
     )
 
 
+@typed
 def constant_radius(
     radius_m: float = 60.0, lateral_mps2: float = 8.4, duration_s: float = 60.0
 ) -> Manoeuvre:
@@ -140,6 +144,7 @@ def constant_radius(
     )
 
 
+@typed
 def brake_in_turn(
     radius_m: float = 100.0,
     lateral_mps2: float = 5.5,
@@ -188,6 +193,7 @@ def brake_in_turn(
     )
 
 
+@typed
 def straight_acceleration(
     duration_s: float = 40.0, low_speed_mps: float = 10.0, top_speed_mps: float = 36.0
 ) -> Manoeuvre:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .._common.arguments import check_positive
+from .._common.typed import typed
 from .curves import Knots, Pulse, Pulses, Sweep, constant
 from .manoeuvre import Manoeuvre
 
@@ -54,6 +55,7 @@ class _Track:
         )
 
 
+@typed
 def step_steer(
     speeds_mps: Sequence[float] = (17.0, 24.0, 31.0),
     lateral_mps2: Sequence[float] = (3.0, 6.0),
@@ -85,6 +87,7 @@ def step_steer(
     return track.manoeuvre("step_steer", "steps of the steering angle to both sides")
 
 
+@typed
 def ramp_steer(
     speeds_mps: Sequence[float] = (18.0, 27.0),
     lateral_mps2: float = 9.2,
@@ -112,6 +115,7 @@ def ramp_steer(
     return track.manoeuvre("ramp_steer", "slow ramps of the steering angle towards the limit")
 
 
+@typed
 def sine_sweep(
     duration_s: float = 40.0,
     speed_mps: float = 25.0,
@@ -143,6 +147,7 @@ def sine_sweep(
     )
 
 
+@typed
 def sine_with_dwell(
     speed_mps: float = 22.2,
     lateral_mps2: Sequence[float] = (2.5, 4.0, 5.5, 7.0),

@@ -14,6 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from .._common.arrays import FloatArray, filled
+from .._common.typed import typed
 from ..log import Log
 from ..vehicle import Vehicle
 
@@ -85,6 +86,7 @@ class Recognised:
         )
 
 
+@typed
 def recognise(log: Log, vehicle: Vehicle) -> tuple[Recognised, ...]:
     """Find the standard manoeuvres that a log holds.
 

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._common.arrays import FloatArray
+from .._common.typed import typed
 from ..errors import InvalidInput
 from ..tyre import Tyre
 from ..vehicle import GRAVITY_MPS2, Vehicle
@@ -29,12 +30,14 @@ def _slip_for(tyre: Tyre, mu: FloatArray) -> FloatArray:
     return np.asarray(np.sign(mu) * np.interp(within, rising, alpha), dtype=float)
 
 
+@typed
 def peak_lateral_mps2(vehicle: Vehicle) -> float:
     """Lateral acceleration at which the weaker axle has reached its peak [m/s2]."""
     tyres = (vehicle.tyre_front, vehicle.tyre_rear)
     return GRAVITY_MPS2 * min(float(_curve(tyre)[1][-1]) for tyre in tyres)
 
 
+@typed
 def understeer_gradient(vehicle: Vehicle) -> float:
     """Steering angle per lateral acceleration for small ones [rad s2/m].
 
@@ -52,6 +55,7 @@ def slip_difference(vehicle: Vehicle, lateral_mps2: npt.ArrayLike) -> FloatArray
     return _slip_for(vehicle.tyre_front, mu) - _slip_for(vehicle.tyre_rear, mu)
 
 
+@typed
 def steady_steer(
     vehicle: Vehicle, speed_mps: npt.ArrayLike, lateral_mps2: npt.ArrayLike
 ) -> FloatArray:

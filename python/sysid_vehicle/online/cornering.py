@@ -16,6 +16,7 @@ from .. import _core
 from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Told
 from .._common.style import AFTER, MEASURED, axes_or_new, tidy
+from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
@@ -56,6 +57,7 @@ class CorneringRls:
         If a value cannot be.
     """
 
+    @typed
     def __init__(
         self,
         vehicle: Vehicle,
@@ -176,6 +178,7 @@ class CorneringRun(Told):
         return tidy(ax, xlabel="time [s]", ylabel="cornering stiffness [kN/rad]")
 
 
+@typed
 def cornering_stiffness(
     vehicle: Vehicle,
     log: Log,

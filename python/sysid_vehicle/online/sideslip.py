@@ -9,18 +9,19 @@ import numpy as np
 
 from .. import _core
 from .._common.arrays import FloatArray, as_float64
+from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
 from ..tyre import Tyre
 from ..vehicle import Vehicle, vehicle_data
-from .sideslip_results import SideslipRun
+from .sideslip_results import SideslipRun, judged_by
 from .sideslip_settings import NOISE_BLOCK, SideslipSettings
 
 #: Kinds of observers, with what each is.
 KINDS: Mapping[str, str] = {
     "dual": "dual UKF with saturating, load-dependent, adapting tyres",
-    "ukf": "UKF of three states with the tyres of the vehicle file",
+    "ukf": "UKF of three states with the tyres of the vehicle file, which it takes as exact",
     "ekf": "the same as an extended Kalman filter",
     "square-root-ukf": "the same as a square-root UKF",
     "linear-ukf": "the UKF with tyres that do not saturate",
@@ -86,6 +87,9 @@ class SideslipObserver:
     Little slip teaches less of the stiffness (partial update: Brink, *J. Guid. Control Dyn.* 40,
     2017).
 
+    The standard deviation of the other kinds takes the tyres of the vehicle file as exact; with
+    other tyres, or on another surface, it is far too small. `estimate_sideslip` judges it.
+
     Readings that no car gives, by their size or by how fast they change, are refused: the tyre
     model stands in, and `mode` says so. Steps beyond 0.01 s are divided. After a step of more than
     1 s, or where the estimate leaves 1.2 rad, the motion begins again with its initial covariance;
@@ -94,6 +98,7 @@ class SideslipObserver:
     Calls from several threads take turns. An observer pickles and copies with its state.
     """
 
+    @typed
     def __init__(
         self,
         vehicle: Vehicle,
@@ -115,6 +120,7 @@ class SideslipObserver:
         else:
             raise InvalidInput(f"kind: '{kind}' is not known; give one of {', '.join(KINDS)}")
 
+    @typed
     def step(
         self,
         dt_s: float,
@@ -136,6 +142,7 @@ class SideslipObserver:
             self._core.step(dt_s, steer_rad, vx_mps, yaw_rate_radps, ax_mps2, ay_mps2)
         )
 
+    @typed
     def run(self, dt_s: FloatArray, sensors: FloatArray) -> FloatArray:
         """Use many samples at once, with the numbers of as many steps.
 
@@ -172,14 +179,21 @@ class SideslipObserver:
         return self._core.samples
 
 
+@typed
 def estimate_sideslip(
     vehicle: Vehicle,
     log: Log,
     *,
     kind: str = "dual",
     settings: SideslipSettings | None = None,
+    judge: bool = True,
 ) -> SideslipRun:
     """Estimate sideslip over a whole log; a measured ``vy_mps`` is not looked at.
+
+    Kinds with fixed tyres take them as exact, and no reading tells them otherwise: where the car
+    corners steadily, one sideslip explains any lateral acceleration. So the dual observer, which
+    learns the tyres, is run beside them. By what it knows, the error of another estimate has the
+    mean square of its own variance and the squared distance of both: that is the band.
 
     Parameters
     ----------
@@ -191,6 +205,9 @@ def estimate_sideslip(
         One of :data:`KINDS`.
     settings : SideslipSettings, optional
         If left out, :meth:`SideslipSettings.of` the log.
+    judge : bool
+        Whether the dual observer judges the band of another kind, which takes a hundred times as
+        long. Without it the band is that of tyres that are exact.
 
     Raises
     ------
@@ -202,10 +219,14 @@ def estimate_sideslip(
     Warns
     -----
     SysidWarning
-        If the car is too slow for the observer all the time.
+        If the car is too slow for the observer all the time, or the tyres of the vehicle file do
+        not fit the drive.
     """
     settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
-    return run_over(log, SideslipObserver(vehicle, settings, kind), settings)
+    run = run_over(log, SideslipObserver(vehicle, settings, kind), settings)
+    if kind == "dual" or not judge or run.too_slow:
+        return run
+    return judged_by(run, run_over(log, SideslipObserver(vehicle, settings), settings))
 
 
 def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -> SideslipRun:
@@ -213,24 +234,25 @@ def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -
     sensors = np.column_stack([log[name] for name in _SENSORS])
     dt = np.full(log.n, 1.0 / log.rate_hz)
     found = SideslipEstimate._make(observer.run(dt, sensors).T)
-    if (np.asarray(found.mode) == 1).all():
+    true_beta = true_std = None
+    if log.has("vy_mps"):
+        true_beta = np.arctan2(log["vy_mps"], log["vx_mps"])
+        across = white_noise_std(log["vy_mps"], NOISE_BLOCK)
+        true_std = across / np.maximum(np.hypot(log["vx_mps"], log["vy_mps"]), 1.0)
+    run = SideslipRun(
+        observer.kind, observer.vehicle, log.name, settings, log["time_s"], log["ay_mps2"],
+        true_beta,
+        true_std,
+        **{name: np.ascontiguousarray(column) for name, column in found._asdict().items()},
+    )  # fmt: skip
+    if run.too_slow:
         warn(
             f"{log.name}: vx_mps: reaches {np.nanmax(log['vx_mps']):.3g} m/s, and the observer "
             f"runs from {settings['go_above_mps']:.3g} m/s on: no sideslip was estimated. Give a "
             f"log of driving forwards, check unit and sign of the speed, or lower stop_below_mps "
             f"and go_above_mps of the settings"
         )
-    true_beta = true_std = None
-    if log.has("vy_mps"):
-        true_beta = np.arctan2(log["vy_mps"], log["vx_mps"])
-        across = white_noise_std(log["vy_mps"], NOISE_BLOCK)
-        true_std = across / np.maximum(np.hypot(log["vx_mps"], log["vy_mps"]), 1.0)
-    return SideslipRun(
-        observer.kind, observer.vehicle, log.name, settings, log["time_s"], log["ay_mps2"],
-        true_beta,
-        true_std,
-        **{name: np.ascontiguousarray(column) for name, column in found._asdict().items()},
-    )  # fmt: skip
+    return run
 
 
 def static_stiffness(vehicle: Vehicle) -> tuple[float, float]:

@@ -11,6 +11,7 @@ import numpy as np
 from .._common.arguments import generator
 from .._common.arrays import FloatArray
 from .._common.printed import Told
+from .._common.typed import typed
 from ..errors import InvalidInput
 from ..export import identified_vehicle
 from ..identify import Fit
@@ -70,6 +71,7 @@ class SideslipCalibration(Told):
         return "\n".join([*lines, "  " + ", ".join(changed)])
 
 
+@typed
 def calibrate_sideslip(
     vehicle: Vehicle,
     log: Log,
@@ -123,7 +125,9 @@ def calibrate_sideslip(
 
     def tried(x: FloatArray) -> tuple[float, SideslipRun]:
         changed = dict(zip(names, (float(v) for v in np.exp(x)), strict=True))
-        run = estimate_sideslip(vehicle, log, kind=kind, settings=start.replace(**changed))
+        run = estimate_sideslip(
+            vehicle, log, kind=kind, settings=start.replace(**changed), judge=False
+        )
         far = 0.5 * float(np.sum((x - begin) ** 2)) / _SPREAD**2
         return _score(run) - far * _LASTS_S / max(log.duration_s, _LASTS_S), run
 
@@ -169,6 +173,7 @@ def _log_density(off: FloatArray, std: FloatArray) -> float:
     return float(np.mean(-0.5 * (off / std) ** 2 - np.log(std)) - 0.5 * math.log(2.0 * math.pi))
 
 
+@typed
 def fitted_vehicle(fit: Fit) -> Vehicle:
     """The car of a fit with the tyres, and the yaw inertia, that were found."""
     return identified_vehicle(fit.model)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from .._common.arrays import FloatArray
 from .._common.printed import Told
 from .._common.style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
 from .._common.text import number, text_table
+from .._common.typed import typed
+from ..errors import warn
 from ..vehicle import Vehicle
 from .sideslip_settings import SideslipSettings
 
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BAND_MPS2 = 2.0
+_BY_CHANCE = 0.05  # what a band of 2 standard deviations leaves outside
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,10 @@ class SideslipRun(Told):
         The white noise of that.
     beta_rad, beta_std_rad : ndarray
         Sideslip and its standard deviation.
+    exact_std_rad, refuted : ndarray or None
+        Of kinds with fixed tyres that the dual observer has judged: the standard deviation that
+        they have if the tyres of the vehicle file are exact; whether the dual observer's sideslip
+        is further away than both bands allow.
     vx_mps, yaw_rate_radps, fyf_n, fyr_n, fx_n : ndarray
         Speed, yaw rate, lateral axle forces, longitudinal force without drag.
     cf_npr, cr_npr, cf_std_npr, cr_std_npr, mu_f, mu_r, mu_f_std, mu_r_std : ndarray
@@ -107,6 +116,13 @@ class SideslipRun(Told):
     mode: FloatArray
     mu_f_std: FloatArray
     mu_r_std: FloatArray
+    exact_std_rad: FloatArray | None = None
+    refuted: npt.NDArray[np.bool_] | None = None
+
+    @property
+    def too_slow(self) -> bool:
+        """Whether nothing was estimated, as the car never was fast enough."""
+        return bool((self.mode == 1).all())
 
     @property
     def vy_mps(self) -> FloatArray:
@@ -151,6 +167,7 @@ class SideslipRun(Told):
                 f"  sideslip {beta.min():.2f} .. {beta.max():.2f} deg, standard deviation "
                 f"{np.degrees(np.nanmean(self.beta_std_rad)):.3f} deg on average"
             ),
+            *self._tyres_said(),
         ]
         running = np.flatnonzero(self.mode != 1)
         if running.size:
@@ -175,6 +192,20 @@ class SideslipRun(Told):
                 lines.append(f"  {100.0 * share:.3g} % of samples {meaning}")
         found = self.error()
         return "\n".join([*lines, *([str(found)] if found is not None else [])])
+
+    def _tyres_said(self) -> list[str]:
+        if self.kind == "dual":
+            return []
+        if self.kind == "published":
+            return ["  the band is the published filter's own, without errors of the model"]
+        if self.exact_std_rad is None or self.refuted is None:
+            return ["  the band takes the tyres of the vehicle file as exact"]
+        exact = np.degrees(np.nanmean(self.exact_std_rad))
+        share = 100.0 * float(np.mean(self.refuted))
+        return [
+            f"  the band is judged by the dual observer; were the tyres exact, {exact:.3f} deg",
+            f"  refuted by the dual observer in {share:.3g} % of samples",
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """All figures and series as plain numbers."""
@@ -207,7 +238,11 @@ class SideslipRun(Told):
                     for a, b, rms, n in found.bands
                 ],
             },
-            "series": {name: getattr(self, name).tolist() for name in series},
+            "series": {
+                name: values.tolist()
+                for name in (*series, "exact_std_rad", "refuted")
+                if (values := getattr(self, name)) is not None
+            },
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -245,6 +280,39 @@ class SideslipRun(Told):
         return tidy(ax, xlabel="time [s]", ylabel="cornering stiffness [kN/rad]")
 
 
+def judged_by(run: SideslipRun, dual: SideslipRun) -> SideslipRun:
+    """The run with a band by what another one knows, which has learned the tyres.
+
+    Parameters
+    ----------
+    run, dual : SideslipRun
+        Over the same log; the second by the dual observer.
+
+    Warns
+    -----
+    SysidWarning
+        If the two are further apart than both bands allow for longer than chance explains.
+    """
+    apart = run.beta_rad - dual.beta_rad
+    refuted = np.abs(apart) > 2.0 * np.hypot(run.beta_std_rad, dual.beta_std_rad)
+    share = float(np.mean(refuted))
+    if share > _BY_CHANCE:
+        first = run.time_s[int(np.argmax(refuted))]
+        warn(
+            f"{run.log_name}: the tyres of '{run.vehicle.name}' do not fit this drive: in "
+            f"{100.0 * share:.3g} % of samples, first at t = {first:.5g} s, the sideslip of the "
+            f"{run.kind} observer is further from that of the dual one than both bands allow; take "
+            f"kind 'dual', or tyres of this car on this surface (fitted_vehicle)"
+        )
+    return dataclasses.replace(
+        run,
+        beta_std_rad=np.hypot(apart, dual.beta_std_rad),
+        exact_std_rad=run.beta_std_rad,
+        refuted=refuted,
+    )
+
+
+@typed
 def sideslip_overview(run: SideslipRun) -> Figure:
     """Sideslip, cornering stiffness and axle forces over time in one figure."""
     figure = new_figure(9.0, 9.0)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .._common.files import as_path
+from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..log import Columns, Log
 from ..vehicle import Vehicle
@@ -35,6 +36,7 @@ __all__ = [
 _OF_FRAMES = ("can_log", "mdf")  # modules of formats that may hold CAN frames
 
 
+@typed
 def read_log(
     source: str | Path | Columns,
     channels: str | Path | Mapping[str, Any] | ChannelMap | None = None,

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._common.arguments import real
 from .._common.text import text_table
+from .._common.typed import typed_fields
 from ..errors import InvalidInput
 
 _NULLS = "benchmarks/exam --draw null=2000"
@@ -104,6 +105,7 @@ class Rules:
         _OUTSIDE,
     )
 
+    @typed_fields
     def __post_init__(self) -> None:
         for f in fields(self):
             value = real(getattr(self, f.name))

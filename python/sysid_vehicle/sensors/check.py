@@ -10,6 +10,7 @@ import numpy as np
 
 from .._common.arguments import expect, whole
 from .._common.progress import doing
+from .._common.typed import typed
 from ..errors import SysidError
 from ..log import Log, several_logs
 from ..vehicle import Vehicle
@@ -33,6 +34,7 @@ _FLOOR = 1e-3  # least noise, of the channel's standard deviation
 Told = Callable[[Estimate, Sequence[SensorFault]], bool]
 
 
+@typed
 def check(
     logs: Log | Sequence[Log], vehicle: Vehicle | None = None, *, seed: int = 0
 ) -> SensorCheck:

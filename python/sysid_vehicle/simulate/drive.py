@@ -12,6 +12,7 @@ from .. import _core
 from .._common.arguments import expect, generator
 from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Told
+from .._common.typed import typed
 from ..effects import channels_in_use
 from ..errors import InvalidInput, NumericalError
 from ..log import CHANNELS, MEASURED, Log
@@ -166,6 +167,7 @@ def _channels(
     return made
 
 
+@typed
 def drive(
     model: Model,
     manoeuvre: Manoeuvre,

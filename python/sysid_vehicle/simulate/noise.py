@@ -9,6 +9,7 @@ import scipy
 
 from .._common.arguments import check_not_negative
 from .._common.arrays import FloatArray, as_float64
+from .._common.typed import typed_fields
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2
 
@@ -36,6 +37,7 @@ class SensorNoise:
     ay_mps2: float = 0.06
     steer_rad: float = 2e-4
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_not_negative(self, finite=True)
 
@@ -88,6 +90,7 @@ class RoadDisturbance:
     slope_rad: float = 0.0
     slope_time_s: float = 5.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_not_negative(self, finite=True)
         for name in ("correlation_time_s", "slope_time_s"):

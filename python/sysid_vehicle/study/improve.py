@@ -9,6 +9,7 @@ from typing import Literal
 from .._common.arguments import duration, whole
 from .._common.progress import teller
 from .._common.threads import before
+from .._common.typed import typed
 from ..diagnose import beside_what_they_refine, considered, refining
 from ..effects import effect
 from ..estimate import Driving
@@ -32,6 +33,7 @@ _BASELINE = "the likeliest parameters of the baseline"
 _CLOCK = "the results with the delay of the wheel force corrected"
 
 
+@typed
 @explaining
 def improve(
     model: Model,

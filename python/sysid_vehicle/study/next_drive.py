@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .._common.arguments import expect
+from .._common.typed import typed
 from ..diagnose import DriveLimits, NextDrive, suggest_manoeuvre
 from ..errors import InvalidInput
 from ..identify import explaining, refine
@@ -10,6 +11,7 @@ from .results.next_steps import open_groups
 from .study import Study
 
 
+@typed
 @explaining
 def next_drive(
     study: Study,

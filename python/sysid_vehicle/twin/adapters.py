@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
+from .._common.typed import typed
 from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES, Load, TwinCar
+from .checks import check_apart
 from .drives import INPUTS, OUTPUTS
 from .observer import STATES
 
@@ -79,6 +81,7 @@ class NativeTwin(_Standing):
     parameter_names = LOAD_NAMES
     capabilities = frozenset({"parameters", "state", "wrench", "snapshot", "clone"})
 
+    @typed
     def __init__(self, car: TwinCar, load: Load, speed_mps: float, *, dt_s: float = 1e-3) -> None:
         self.car = car
         self.dt_s = dt_s
@@ -171,11 +174,13 @@ class CallableTwin(_Standing):
     Raises
     ------
     InvalidInput
-        If the state does not fit its names.
+        If the state does not fit its names, a name comes twice, or `step` or `outputs` is no
+        function.
     """
 
     capabilities = frozenset({"parameters", "state", "snapshot", "clone"})
 
+    @typed
     def __init__(
         self,
         step: Callable[[FloatArray, FloatArray, dict[str, float]], FloatArray],
@@ -188,12 +193,18 @@ class CallableTwin(_Standing):
         state_names: Sequence[str],
         parameters: Mapping[str, float],
     ) -> None:
+        for what, function in (("step", step), ("outputs", outputs)):
+            if not callable(function):
+                raise InvalidInput(f"{what} = {function!r}; give a function")
         self._step, self._outputs = step, outputs
         self.dt_s = dt_s
         self.input_names = tuple(input_names)
         self.output_names = tuple(output_names)
         self.state_names = tuple(state_names)
         self.parameter_names = tuple(parameters)
+        for names in (self.input_names, self.output_names, self.state_names):
+            if names:
+                check_apart("names of the twin", names)
         self._parameters = {name: float(value) for name, value in parameters.items()}
         self._state = as_float64(state).copy()
         if self._state.shape != (len(self.state_names),):
@@ -241,6 +252,8 @@ def _numbers(found: Any, names: Sequence[str], what: str) -> FloatArray:
     asked = f"give an array of {len(names)}: {', '.join(names)}"
     if found is None:
         raise InvalidInput(f"{what} of the twin gave None; {asked}")
+    if np.iscomplexobj(found):
+        raise InvalidInput(f"{what} of the twin gave complex numbers; {asked}")
     try:
         numbers = as_float64(found)
     except (TypeError, ValueError) as error:

@@ -18,6 +18,7 @@ from .._common.arguments import generator, whole
 from .._common.arrays import FloatArray
 from .._common.printed import Told
 from .._common.style import AFTER, MEASURED, axes_or_new, tidy
+from .._common.typed import typed, typed_fields
 from ..errors import InvalidInput, NumericalError
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class Box:
 
     ranges: Mapping[str, tuple[float, float]]
 
+    @typed_fields
     def __post_init__(self) -> None:
         for name, (lower, upper) in self.ranges.items():
             if not lower < upper:
@@ -268,6 +270,7 @@ class Calibration(Told):
         return "\n".join(lines)
 
 
+@typed
 def calibrate(
     cost: Callable[[dict[str, float]], float],
     box: Box,

@@ -14,6 +14,7 @@ import numpy as np
 from .. import _core
 from .._common.arrays import FloatArray
 from .._common.text import html_text
+from .._common.typed import typed_fields
 from ..errors import InvalidInput, near_names
 
 
@@ -69,6 +70,7 @@ class Load:
     jxz_kgm2: float = 0.0
     jyz_kgm2: float = 0.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         for name in LOAD_NAMES:
             if not np.isfinite(getattr(self, name)):
@@ -164,6 +166,7 @@ class TwinCar:
     values: Mapping[str, float] = field(default_factory=dict)
     name: str = "sport utility vehicle"
 
+    @typed_fields
     def __post_init__(self) -> None:
         known = self._numbers()
         for name in self._spelt_out():

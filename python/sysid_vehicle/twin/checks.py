@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
+from .._common.arguments import whole
 from .._common.arrays import FloatArray, as_float64
-from ..errors import InvalidInput
+from ..errors import InvalidInput, near_names
 
 _LONGEST_STEP_S = 0.1
+_USUAL_STRIDE = 10
 # The most that a name of this beginning or ending can mean, in the units of the name.
 _MOST = (
     ("steer_", 2.0),
@@ -106,6 +108,53 @@ def checked_step(dt_s: float) -> float:
             f"dt_s = {dt_s!r}; give seconds, more than zero and at most {_LONGEST_STEP_S:g}"
         )
     return float(dt_s)
+
+
+def checked_stride(stride: object, samples: int) -> int:
+    """A stride that leaves more than the start.
+
+    Raises
+    ------
+    InvalidInput
+        If it is no whole number, or beyond the samples.
+    """
+    every = whole(stride, "stride", 1)
+    if every > max(samples, _USUAL_STRIDE):
+        raise InvalidInput(
+            f"stride = {every}: of {samples} samples the first alone would be recorded; give less"
+        )
+    return every
+
+
+def check_apart(what: str, names: Sequence[str]) -> None:
+    """Refuse no names, and names that come twice.
+
+    Raises
+    ------
+    InvalidInput
+        As it says.
+    """
+    if not names:
+        raise InvalidInput(f"{what}: none are given; give one or more")
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidInput(f"{what}: '{name}' comes twice; give it once")
+
+
+def check_heard(compared: Iterable[str], measured: Collection[str]) -> None:
+    """Refuse to compare what is not measured: it would teach nothing, silently.
+
+    Raises
+    ------
+    InvalidInput
+        If a compared channel is not among those that hold a reading; the message names it.
+    """
+    for name in compared:
+        if name not in measured:
+            raise InvalidInput(
+                f"the observer compares '{name}', which is not measured{near_names(name, measured)}"
+                f"; there are {', '.join(measured) or 'no readings'}"
+            )
 
 
 def _most(name: str) -> float:

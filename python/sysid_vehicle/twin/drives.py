@@ -8,12 +8,14 @@ import numpy as np
 import scipy
 
 from .. import _core
-from .._common.arguments import generator
+from .._common.arguments import duration, generator
 from .._common.arrays import FloatArray, as_float64
 from .._common.text import brief
+from .._common.typed import typed
 from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import Manoeuvre
 from .car import Load, TwinCar
+from .checks import checked_step
 
 WHEELS = ("fl", "fr", "rl", "rr")
 INPUTS = (
@@ -101,6 +103,7 @@ class Drive14:
         )
 
 
+@typed
 def drive14(
     car: TwinCar,
     load: Load | None,
@@ -134,9 +137,19 @@ def drive14(
 
     Raises
     ------
+    InvalidInput
+        If the references have another shape or hold a number that is not finite, or the step is no
+        step.
     NumericalError
         If the car spun, stopped or overturned; the message names the time.
     """
+    dt_s = checked_step(dt_s)
+    references = as_float64(references)
+    if references.ndim != 2 or references.shape[1] != 3 or not np.isfinite(references).all():
+        raise InvalidInput(
+            f"references have shape {references.shape}; give (n, 3) finite numbers: speed [m/s], "
+            f"curvature [1/m], steering [rad]"
+        )
     n = len(references)
     if driver is None:
         driver = _core.Driver()
@@ -145,7 +158,7 @@ def drive14(
     inputs, states, outputs, lost_at = car.core(load).drive(
         driver,
         [drive_front_share, brake_front_share],
-        np.ascontiguousarray(references, dtype=np.float64),
+        references,
         np.zeros((n, len(INPUTS))) if base is None else np.ascontiguousarray(base),
         dt_s,
     )
@@ -157,6 +170,11 @@ def drive14(
     return Drive14(name, dt_s, inputs, states, outputs)
 
 
+def _times(duration_s: float, dt_s: float) -> FloatArray:
+    steps = round(duration(duration_s, "duration_s") / checked_step(dt_s))
+    return as_float64(np.arange(steps) * dt_s)
+
+
 def _references(n: int, speed_mps: FloatArray | float, steer_rad: FloatArray | float) -> FloatArray:
     out = np.zeros((n, 3))
     out[:, 0] = speed_mps
@@ -164,11 +182,12 @@ def _references(n: int, speed_mps: FloatArray | float, steer_rad: FloatArray | f
     return out
 
 
+@typed
 def urban_cycle(
     car: TwinCar, load: Load | None = None, *, duration_s: float = 180.0, dt_s: float = 1e-3
 ) -> Drive14:
     """Stop-and-go speeds between 5 and 19 m/s with a bend now and then; excites the mass."""
-    t = np.arange(round(duration_s / dt_s)) * dt_s
+    t = _times(duration_s, dt_s)
     speed = 12.0 + 4.0 * np.sin(2.0 * np.pi * t / 23.0) + 3.0 * np.sin(2.0 * np.pi * t / 9.1 + 1.0)
     phase = np.mod(t, 20.0)
     side = np.where(np.mod(t, 40.0) < 20.0, 1.0, -1.0)
@@ -178,6 +197,7 @@ def urban_cycle(
     )
 
 
+@typed
 def swept_steer(
     car: TwinCar,
     load: Load | None = None,
@@ -190,12 +210,13 @@ def swept_steer(
     dt_s: float = 1e-3,
 ) -> Drive14:
     """Sine sweeps from 0 to `top_hz`; excite roll and yaw inertia."""
-    t = np.arange(round(sweep_s * repeats / dt_s)) * dt_s
+    t = _times(sweep_s * repeats, dt_s)
     own = np.mod(t, sweep_s)
     steer = steer_rad * np.sin(np.pi * top_hz / sweep_s * own**2)
     return drive14(car, load, _references(len(t), speed_mps, steer), dt_s=dt_s, name="swept steer")
 
 
+@typed
 def rough_road(
     car: TwinCar,
     load: Load | None = None,
@@ -213,7 +234,7 @@ def rough_road(
     it wheelbase/speed later (the paper prints the inverse).
     """
     rng = generator(seed)
-    t = np.arange(round(duration_s / dt_s)) * dt_s
+    t = _times(duration_s, dt_s)
     leak = np.exp(-2.0 * np.pi * 0.02 * speed_mps * dt_s)
     profile = scipy.signal.lfilter([1.0], [1.0, -leak], rng.standard_normal(len(t)))
     low = scipy.signal.butter(2, 15.0, fs=1.0 / dt_s, output="sos")
@@ -227,6 +248,7 @@ def rough_road(
     )
 
 
+@typed
 def on_manoeuvre(
     car: TwinCar,
     load: Load | None,

@@ -23,6 +23,7 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
+from .._common.typed import typed
 from ..errors import InvalidInput, NumericalError, near_names
 
 Kind = Literal["model_exchange", "co_simulation"]
@@ -102,6 +103,7 @@ class FMUTwin:
         not offer `kind`.
     """
 
+    @typed
     def __init__(
         self,
         path: Path | str,

@@ -16,8 +16,10 @@ from typing import Literal
 import numpy as np
 
 from .. import _core
+from .._common.typed import check_types, typed, typed_fields
 from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES, NOMINAL_SUV, Load
+from .checks import check_apart
 from .drives import INPUTS
 
 # Of the first guess's size: how far the twins stand apart, how wrong the guess may be, limits.
@@ -26,6 +28,8 @@ _SPREAD = {"mass_kg": 0.15, "jxx_kgm2": 0.15, "jyy_kgm2": 0.2, "jzz_kgm2": 0.2}
 _SPREAD_M = {"cg_x_m": 0.1, "cg_y_m": 0.03, "cg_z_m": 0.1}
 _PRODUCT = 0.03  # of the root of its two moments
 INPUT_SCALE = "input_scale"
+_ESTIMATED, _CONSIDERED, _START = 0.0, 1.0, 2.0  # as the core's binding reads them
+_START_STEP = 0.01  # between the twins, of the standard deviation
 _TORQUES = INPUTS[2:10]
 _ANGULAR = {
     "jxx_kgm2": "roll_rate_radps",
@@ -94,7 +98,9 @@ class ParameterLaw:
     upper: float = float("inf")
     stage: int = 0
 
+    @typed_fields
     def __post_init__(self) -> None:
+        check_types(self)
         if self.gain < 0.0 or self.first_gain < 0.0 or not self.lower < self.upper:
             raise InvalidInput(
                 f"law of {self.parameter}: gains must not be negative and lower must be below upper"
@@ -155,7 +161,11 @@ class Unknown:
     upper: float
     walk_per_root_s: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_types(self)
 
+
+@typed
 def unknowns(*names: str, around: Load = NOMINAL_SUV) -> tuple[Unknown, ...]:
     """Unknowns of a load with customary spreads around a first guess.
 
@@ -224,6 +234,13 @@ class SideBySide:
         uncertainty does to the estimates. It costs one twin more. Zero: the inputs are exact.
     uncertain_inputs : sequence of str
         Inputs that have this factor, those of them that the twin takes; not the steering.
+    start_std : float
+        Standard deviation of the first value of a state that is compared, in its unit. Without a
+        gain that corrects it a speed keeps for long where it began, and what the steps to each new
+        guess left in it; either would pass for another mass. So where such a state is compared its
+        start is looked for too; that costs one twin more. Angular rates and ``vy_mps``, which tyres
+        hold, forget their start within a second: they have none. Zero: the twin starts exactly
+        where the car does.
 
     Raises
     ------
@@ -241,8 +258,15 @@ class SideBySide:
     high_pass_hz: Mapping[str, float] = field(default_factory=dict)
     input_std: float = 0.03
     uncertain_inputs: Sequence[str] = _TORQUES
+    start_std: float = 1.0
 
+    @typed_fields
     def __post_init__(self) -> None:
+        check_apart("unknowns", [u.parameter for u in self.unknowns])
+        check_apart("channels", list(self.channels))
+        for name in ("forgetting", "start_s", "residual_s", "clip", "gentle_s", "start_std"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise InvalidInput(f"{name} = {getattr(self, name)!r}; give a number from 0 on")
         for u in self.unknowns:
             if not (0.0 < u.spread < np.inf and 0.0 < abs(u.apart) < np.inf and u.lower < u.upper):
                 raise InvalidInput(
@@ -274,14 +298,38 @@ class SideBySide:
         scale = Unknown(INPUT_SCALE, deviation, 0.2 * deviation, 1.0 - most, 1.0 + most)
         return (*self.unknowns, scale)
 
+    def starts(self, states: Sequence[str], corrected: Sequence[str] = ()) -> dict[str, float]:
+        """States of a twin whose start is looked for, with the steps between the twins.
+
+        Parameters
+        ----------
+        states : sequence of str
+            Names of its states.
+        corrected : sequence of str
+            Those that gains correct by readings of themselves.
+        """
+        if self.start_std == 0.0:
+            return {}
+        kept = [kept_state(channel) for channel in self.channels]
+        step = _START_STEP * self.start_std
+        return {name: step for name in kept if name in states and name not in corrected}
+
+    def start_steps(
+        self, inputs: Sequence[str], states: Sequence[str], starts: Mapping[str, float]
+    ) -> list[tuple[int, int, float]]:
+        """Of each start: which twin is apart, in which of its states, and how far."""
+        steps = enumerate(starts.items(), 1 + len(self.looked_for(inputs)))
+        return [(i, states.index(name), step) for i, (name, step) in steps]
+
     def core(
         self,
         parameters: Sequence[str],
         channels: Sequence[str],
         dt_s: float,
         inputs: Sequence[str] = (),
+        starts: Mapping[str, float] | None = None,
     ) -> _core.BatchEstimator:
-        """The compiled estimator, for a twin with these parameters, outputs and inputs."""
+        """The compiled estimator, for a twin with these parameters, outputs, inputs and starts."""
         rows = [
             [
                 float(
@@ -294,9 +342,12 @@ class SideBySide:
                 u.walk_per_root_s,
                 u.lower,
                 u.upper,
-                1.0 if u.parameter == INPUT_SCALE else 0.0,
+                _CONSIDERED if u.parameter == INPUT_SCALE else _ESTIMATED,
             ]
             for u in self.looked_for(inputs)
+        ]
+        rows += [
+            [0.0, step, self.start_std, 0.0, 0.0, 0.0, _START] for step in (starts or {}).values()
         ]
         read = [
             [float(place_of(c, channels, "channel")), noise, self.high_pass_hz.get(c, 0.0)]
@@ -309,6 +360,7 @@ class SideBySide:
             raise InvalidInput(str(error)) from error
 
 
+@typed
 def mass_law(gain: float = 150.0, *, around: Load = NOMINAL_SUV, **changes: object) -> ParameterLaw:
     """The mass by the longitudinal acceleration: eq. (14), with the gate of eq. (24)."""
     given: dict[str, object] = {
@@ -319,6 +371,7 @@ def mass_law(gain: float = 150.0, *, around: Load = NOMINAL_SUV, **changes: obje
     return ParameterLaw("mass_kg", "ax_mps2", gain, **{**given, **changes})  # type: ignore[arg-type]
 
 
+@typed
 def inertia_law(
     parameter: str, gain: float, *, around: Load = NOMINAL_SUV, **changes: object
 ) -> ParameterLaw:
@@ -327,6 +380,14 @@ def inertia_law(
     value = getattr(around, parameter)
     given: dict[str, object] = {"lower": (1.0 - _LIMIT) * value, "upper": (1.0 + _LIMIT) * value}
     return ParameterLaw(parameter, _ANGULAR[parameter], gain, **{**given, **changes})  # type: ignore[arg-type]
+
+
+def kept_state(channel: str) -> str:
+    """The state that a channel reads and that keeps what it began with; empty if there is none."""
+    if channel.startswith("wheel_speed_"):
+        return "vx_mps"  # wheels roll
+    forgets = channel == "vy_mps" or channel.endswith("_rate_radps")
+    return "" if forgets else channel
 
 
 def place_of(name: str, known: Sequence[str] | Mapping[str, str], what: str) -> int:

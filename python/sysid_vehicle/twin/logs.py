@@ -10,6 +10,7 @@ import numpy as np
 
 from .._common.arguments import generator
 from .._common.arrays import as_float64
+from .._common.typed import typed
 from ..errors import InvalidInput
 from ..log import Log
 from ..simulate import SensorNoise
@@ -19,6 +20,7 @@ from .car import Load, TwinCar
 from .drives import WHEELS, Drive14
 
 
+@typed
 def single_track(
     car: TwinCar,
     load: Load | None = None,
@@ -59,6 +61,7 @@ def single_track(
     )
 
 
+@typed
 def to_log(
     car: TwinCar,
     drive: Drive14,

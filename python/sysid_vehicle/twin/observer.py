@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .. import _core
-from .._common.arguments import whole
+from .._common.arguments import check_positive
 from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Told
 from .._common.style import AFTER, TRUTH, axes_or_new, tidy
+from .._common.typed import check_types, typed
 from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
-from .checks import checked_rows, checked_step
+from .checks import checked_rows, checked_step, checked_stride
 from .drives import INPUTS, OUTPUTS, WHEELS
 from .failing import check_start
-from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, place_of
+from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, kept_state, place_of
 from .readings import READINGS, Readings
 from .residuals import ChannelResidual, Shown, contradictions, residual_of
 
@@ -63,6 +64,9 @@ class StateGain:
     gain: float
     unit: Literal["per_second", "per_sample"] = "per_second"
 
+    def __post_init__(self) -> None:
+        check_types(self)
+
     def row(self, channels: Sequence[str], states: Sequence[str]) -> list[float]:
         """Positions, gain and unit, as the core takes them."""
         return [
@@ -97,12 +101,30 @@ class Observer:
     schedule: Schedule = field(default_factory=Schedule)
     derivative_hz: float = 20.0
 
+    def __post_init__(self) -> None:
+        check_types(self)
+
     @property
     def limits(self) -> list[tuple[str, float, float]]:
         """Parameters that are looked for, with their lower and upper limits."""
         batch = () if self.batch is None else self.batch.unknowns
         found = [(u.parameter, u.lower, u.upper) for u in batch]
         return found + [(law.parameter, law.lower, law.upper) for law in self.laws]
+
+    @property
+    def compared(self) -> list[str]:
+        """Channels of which the readings of car and twin are compared."""
+        channels = [g.channel for g in self.gains] + [law.channel for law in self.laws]
+        return channels + ([] if self.batch is None else list(self.batch.channels))
+
+    @property
+    def corrected(self) -> list[str]:
+        """States that gains correct by readings of themselves."""
+        return [g.state for g in self.gains if g.gain and g.state == kept_state(g.channel)]
+
+    def starts(self, states: Sequence[str]) -> dict[str, float]:
+        """States of a twin whose start the batch looks for, with the steps between the twins."""
+        return {} if self.batch is None else self.batch.starts(states, self.corrected)
 
     def core_laws(
         self, parameters: Sequence[str], channels: Sequence[str], dt_s: float
@@ -158,15 +180,20 @@ class Observation(Told):
 
     def last(self, name: str, window_s: float = 1.0) -> float:
         """Mean of a parameter over the last seconds."""
-        return float(np.mean(self.parameters[name][self._end(window_s)]))
+        return float(np.mean(self._of(name)[self._end(window_s)]))
 
     def error_percent(self, name: str, truth: float, change: float, window_s: float = 1.0) -> float:
         """Root mean square error over the last seconds in % of the true change.
 
         Eqs. (11) and (12) of Dettu et al. (2023), with the root that (11) lacks.
         """
-        error = self.parameters[name][self._end(window_s)] - truth
+        check_positive("error_percent", change=abs(change))
+        error = self._of(name)[self._end(window_s)] - truth
         return float(100.0 * np.sqrt(np.mean(error**2)) / abs(change))
+
+    def _of(self, name: str) -> FloatArray:
+        place_of(name, list(self.parameters), "parameter")
+        return self.parameters[name]
 
     def _end(self, window_s: float) -> np.ndarray:
         found: np.ndarray = self.time_s > self.time_s[-1] - window_s
@@ -179,7 +206,7 @@ class Observation(Told):
     def plot(self, name: str, *, truth: float | None = None, ax: Axes | None = None) -> Axes:
         """Draw a parameter over time."""
         ax = axes_or_new(ax, 6.0, 3.0)
-        ax.plot(self.time_s, self.parameters[name], color=AFTER, label="estimate")
+        ax.plot(self.time_s, self._of(name), color=AFTER, label="estimate")
         if truth is not None:
             ax.axhline(truth, color=TRUTH, linestyle="--", label="true")
         ax.legend(frameon=False)
@@ -197,6 +224,7 @@ class Observation(Told):
         return "\n".join(lines)
 
 
+@typed
 def observe(
     car: TwinCar,
     load: Load,
@@ -238,7 +266,8 @@ def observe(
     Warns
     -----
     SysidWarning
-        If residuals contradict the estimates, or an estimate stands at its limit.
+        If residuals contradict the estimates, an estimate stands at its limit, or nothing sets a
+        speed that is compared.
     """
     dt = checked_step(readings.dt_s)
     rows = checked_rows(inputs, INPUTS, "inputs", dt)
@@ -247,13 +276,14 @@ def observe(
         raise InvalidInput(
             f"{len(rows)} rows of inputs but {len(values)} of readings; give equally many"
         )
-    stride = whole(stride, "stride", 1)
+    stride = checked_stride(stride, len(rows))
     check_start(observer.limits, vars(load))
     twin = car.core(load)
     speed = _first_speed(car, readings) if speed_mps is None else float(speed_mps)
     if not abs(speed) <= _FASTEST_MPS:
         raise InvalidInput(f"speed_mps = {speed!r}; give a speed up to {_FASTEST_MPS:g} m/s")
     batch = observer.batch
+    starts = observer.starts(STATES)
     try:
         start = twin.rest(speed)
         loads, outputs, stages, spread = _core.observe14(
@@ -264,9 +294,10 @@ def observe(
             dt,
             [g.row(READINGS, STATES) for g in observer.gains],
             observer.core_laws(LOAD_NAMES, READINGS, dt),
-            None if batch is None else batch.core(LOAD_NAMES, READINGS, dt, INPUTS),
+            None if batch is None else batch.core(LOAD_NAMES, READINGS, dt, INPUTS, starts),
             stride,
             [] if batch is None else batch.scaled(INPUTS),
+            [] if batch is None else batch.start_steps(INPUTS, STATES, starts),
         )
     except NumericalError as error:
         raise NumericalError(f"{error}; take smaller gains or a nearer first load") from error
@@ -305,6 +336,7 @@ def judged(
     stages: FloatArray,
     spread: Sequence[float],
     shown: Shown,
+    doubts: Sequence[str] = (),
 ) -> Observation:
     """An observation with what its residuals say of it; a warning where they contradict it.
 
@@ -320,6 +352,8 @@ def judged(
         Of the batch's unknowns, in parts of their first spread.
     shown : Shown
         What is judged: readings of car and twin, at the recorded times or at more of them.
+    doubts : sequence of str
+        What speaks against the estimates whatever the residuals say.
     """
     batch = observer.batch
     unknown = () if batch is None else batch.looked_for(inputs)
@@ -337,7 +371,7 @@ def judged(
     )
     limits = {law.parameter: (law.lower, law.upper) for law in laws}
     limits.update({u.parameter: (u.lower, u.upper) for u in estimated})
-    against = contradictions(residuals, parameters, limits)
+    against = (*doubts, *contradictions(residuals, parameters, limits))
     wide = {}
     for u, s in zip(estimated, spread, strict=False):
         wide[u.parameter] = float(s) * u.spread
@@ -346,7 +380,7 @@ def judged(
         if not u.lower < parameters[u.parameter][-1] < u.upper:
             wide[u.parameter] = max(wide[u.parameter], 0.5 * (u.upper - u.lower))
     if against:
-        warn("the residuals contradict what the twin found: " + "; ".join(against))
+        warn("what the twin found is not to be believed: " + "; ".join(against))
     return Observation(time_s, parameters, outputs, stages, wide, residuals, against)
 
 

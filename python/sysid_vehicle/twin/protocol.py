@@ -18,18 +18,20 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from .._common.arguments import whole
 from .._common.arrays import FloatArray, as_float64
 from .._common.progress import doing
-from ..errors import InvalidInput, near_names
+from .._common.typed import typed
+from ..errors import InvalidInput
 from .car import LOAD_NAMES
-from .checks import checked_rows, checked_step
+from .checks import check_heard, checked_rows, checked_step, checked_stride
 from .failing import all_numbers, blamed_on, check_repeats, check_start
+from .laws import kept_state
 from .observer import Observation, Observer, judged
 from .residuals import Shown
 
 CAPABILITIES = ("parameters", "state", "wrench", "snapshot", "clone")
 _MOST_PARAMETERS = len(LOAD_NAMES)
+_ASKED = ("dt_s", "input_names", "output_names", "state_names", "parameter_names", "capabilities")
 # Velocity: (force or moment, axis, what resists it). The horizontal axes move the whole mass.
 _PUSHES = {
     "vx_mps": (0, 0, "mass_kg"),
@@ -93,6 +95,7 @@ class Twin(Protocol):
         """Make another that stands where this one does (``clone``)."""
 
 
+@typed
 @doing("observer")
 def observe_with(
     twin: Twin,
@@ -125,13 +128,19 @@ def observe_with(
         If an output of the twin is no number any more, or the simulator failed; the message names
         the time, and the parameters that it had.
     """
+    for name in _ASKED:
+        if not hasattr(twin, name):
+            raise InvalidInput(
+                f"observe_with: twin = {twin!r} has no {name}; give a NativeTwin, a CallableTwin, "
+                f"an FMUTwin, or what does all that sysid_vehicle.twin.Twin describes"
+            )
     dt, names = checked_step(twin.dt_s), twin.parameter_names
     inputs = checked_rows(inputs, twin.input_names, "inputs", dt, any_size=True)
     n = len(inputs)
-    stride = whole(stride, "stride", 1)
+    stride = checked_stride(stride, n)
     read = _table(twin, measured, n, dt)
     _check(twin, observer)
-    _heard(observer, measured)
+    check_heard(observer.compared, measured)
     check_repeats(twin, inputs[0])
     several = _Several(twin, observer, dt)
     check_start(observer.limits, dict(zip(names, several.estimate, strict=False)))
@@ -160,6 +169,7 @@ def observe_with(
             {name: shown[:, i] for i, name in enumerate(twin.output_names)},
             dt,
         ),
+        _left_behind(twin, observer),
     )
 
 
@@ -171,15 +181,22 @@ class _Several:
         self._dt = dt
         self._laws = observer.core_laws(self._names, read, dt)
         self._batch, self._scaled, count = None, [], 1
+        steps: list[tuple[int, int, float]] = []
         if observer.batch is not None:
-            self._batch = observer.batch.core(self._names, read, dt, twin.input_names)
+            starts = observer.starts(_settable(twin))
+            self._batch = observer.batch.core(self._names, read, dt, twin.input_names, starts)
             self._scaled = observer.batch.scaled(twin.input_names)
-            count += len(observer.batch.looked_for(twin.input_names))
+            count += len(observer.batch.looked_for(twin.input_names)) + len(starts)
+            steps = observer.batch.start_steps(twin.input_names, _settable(twin), starts)
         known = twin.get_parameters() if "parameters" in twin.capabilities else {}
         self.estimate = [known.get(name, 0.0) for name in self._names]
         self.estimate += [0.0] * (_MOST_PARAMETERS - len(self.estimate)) + [1.0]
         self._gains = [g.row(read, _correctable(twin)) for g in observer.gains]
         self._twins = [twin, *(twin.clone() for _ in range(count - 1))]
+        for which, state, step in steps:
+            start = np.array(self._twins[which].get_state(), dtype=np.float64)
+            start[state] += step
+            self._twins[which].set_state(start)
         self.at_work = twin
         self._has_states = "state" in twin.capabilities
         self._told = np.zeros((count, len(twin.input_names)))
@@ -244,23 +261,14 @@ def _table(twin: Twin, measured: Mapping[str, FloatArray], n: int, dt: float) ->
     for name, values in measured.items():
         if name not in twin.output_names:
             continue  # a sensor that the twin has no counterpart of teaches nothing
-        if len(values) != n:
-            raise InvalidInput(f"measured '{name}' has {len(values)} samples; the inputs have {n}")
-        read[:, twin.output_names.index(name)] = as_float64(values)
-    return checked_rows(read, twin.output_names, "measured", dt, missing=True, any_size=True)
-
-
-def _heard(observer: Observer, measured: Mapping[str, FloatArray]) -> None:
-    """Refuse an observer that compares what is not measured: it would teach nothing, silently."""
-    compared = [gain.channel for gain in observer.gains]
-    compared += [law.channel for law in observer.laws]
-    compared += [] if observer.batch is None else observer.batch.channels
-    for name in compared:
-        if name not in measured:
+        column = as_float64(values)
+        if len(column) != n or column.ndim != 1:
             raise InvalidInput(
-                f"the observer compares '{name}', which is not measured{near_names(name, measured)}"
-                f"; there are {', '.join(measured) or 'no readings'}"
+                f"measured '{name}' has {len(column)} samples, shape {column.shape}; the inputs "
+                f"have {n}, give shape ({n},)"
             )
+        read[:, twin.output_names.index(name)] = column
+    return checked_rows(read, twin.output_names, "measured", dt, missing=True, any_size=True)
 
 
 def _check(twin: Twin, observer: Observer) -> None:
@@ -282,8 +290,24 @@ def _check(twin: Twin, observer: Observer) -> None:
         )
 
 
+def _left_behind(twin: Twin, observer: Observer) -> list[str]:
+    """Compared channels whose state keeps what earlier guesses did to it, as nothing sets it."""
+    if observer.batch is None or "state" in twin.capabilities:
+        return []
+    return [
+        f"{channel}: the twin's speed cannot be set and keeps what earlier guesses did to it; "
+        f"compare ax_mps2 instead, correct vx_mps by a gain, or give the twin 'state'"
+        for channel in observer.batch.channels
+        if kept_state(channel) == "vx_mps" and "vx_mps" not in observer.corrected
+    ]
+
+
+def _settable(twin: Twin) -> tuple[str, ...]:
+    return twin.state_names if "state" in twin.capabilities else ()
+
+
 def _correctable(twin: Twin) -> tuple[str, ...]:
-    return twin.state_names if "state" in twin.capabilities else tuple(_PUSHES)
+    return _settable(twin) if "state" in twin.capabilities else tuple(_PUSHES)
 
 
 def _correct(

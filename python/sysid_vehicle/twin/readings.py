@@ -10,6 +10,7 @@ import numpy as np
 
 from .._common.arguments import generator
 from .._common.arrays import FloatArray
+from .._common.typed import typed
 from ..errors import InvalidInput, near_names
 from .drives import INPUTS, OUTPUTS, Drive14
 
@@ -47,6 +48,7 @@ class Readings:
         return "\n".join(lines)
 
 
+@typed
 def measure(
     drive: Drive14,
     channels: Sequence[str],
@@ -94,6 +96,7 @@ def measure(
     return Readings(values, scale, drive.dt_s)
 
 
+@typed
 def noisy_road(
     inputs: FloatArray, relative: float, *, seed: int | np.random.Generator = 0
 ) -> FloatArray:

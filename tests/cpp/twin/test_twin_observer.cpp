@@ -268,6 +268,11 @@ TEST(TwinObserver, PlacesOutOfRangeAreRefusedBeforeAnythingRuns) {
     refused(settings);
     settings.scaled = {0};
     refused(settings);
+    settings.scaled = {};
+    settings.starts = {{1, 0, 0.1}};  // there is no second twin
+    refused(settings);
+    settings.starts = {{0, kTwinStatesWithTyres, 0.1}};
+    refused(settings);
     settings = {};
     ParameterLaw law = mass_law(1.0);
     law.channel = kReadings;

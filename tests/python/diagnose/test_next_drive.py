@@ -110,6 +110,8 @@ def test_limits_are_kept(gentle: Fit) -> None:
     assert remedy == nowhere.reserve == nowhere.to_dict()["reserve"]
     with pytest.raises(InvalidInput, match="DriveLimits: speed_mps = -1"):
         DriveLimits(-1.0)
+    with pytest.raises(InvalidInput, match=r"suggest_manoeuvre: enough = nan; give positive"):
+        suggest_manoeuvre(gentle, LAG, RELAXATION, enough=float("nan"))
 
 
 def test_what_acts_alike_only_beside_others_is_asked_with_these(truth: Model, start: Model) -> None:

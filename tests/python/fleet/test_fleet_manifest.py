@@ -34,7 +34,8 @@ def garage(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ({"logs": {"a/b/c": "x.csv"}}, "is no name of a study"),
         ({"logs": {"x": 3}}, "x: 3 is no log|not iterable"),
         ({"logs": ["x.csv"], "start": 1}, r"unknown key 'start' \(did you mean 'starts'"),
-        ({"logs": ["x.csv"], "sensors": None}, "unknown key 'sensors'"),
+        ({"logs": ["x.csv"], "sensors": 3}, "improve_many: sensors: .*give False"),
+        ({"logs": {"a/X": "x.csv", "a/x": "y.csv"}}, "'a/X' and 'a/x' are one file on some"),
         ({"logs": {"x": "x.csv"}, "validation": {"y": "y.csv"}}, "unknown key 'y'"),
         ({"logs": {"x": "x.csv"}, "cars": {"y": sv.example_vehicle()}}, "no car is given"),
         ({"logs": ["x.csv"], "workers": 0}, "workers = 0"),
@@ -46,6 +47,19 @@ def test_arguments_are_checked_first(
     given = {"cars": sv.example_vehicle(), "out": tmp_path / "out", **arguments}
     with pytest.raises((sv.InvalidInput, TypeError), match=message):
         sv.improve_many(**given)
+
+
+def test_a_manifest_may_stand_in_a_folder_named_like_a_pattern(tmp_path: Path) -> None:
+    folder = tmp_path / "day [1] of *"
+    (folder / "logs").mkdir(parents=True)
+    sv.example_vehicle().to_toml(folder / "car.toml")
+    (folder / "logs/one.csv").touch()
+    (folder / "fleet.toml").write_text(
+        'vehicle = "car.toml"\nlogs = "logs/*.csv"\n[improve]\nsensors = false\n'
+    )
+    (job,) = manifest_jobs(folder / "fleet.toml")
+    assert (job.name, job.train) == ("one", (folder / "logs/one.csv",))
+    assert job.options == {"sensors": False}
 
 
 def test_a_manifest_names_its_studies(garage: Path, tmp_path: Path) -> None:

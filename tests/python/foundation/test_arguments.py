@@ -139,7 +139,7 @@ MISTAKES: tuple[tuple[Callable[..., object], str], ...] = (
     (lambda fit, lap, model: sv.improve(model, lap, Table()), r"Table .* Log\.from_arrays"),
     (lambda fit, lap, model: sv.check(None), r"check: a NoneType .* pass a Log"),
     (lambda fit, lap, model: sv.check([]), "check: no log was given"),
-    (lambda fit, lap, model: sv.check(lap, model), "check: a Model .* pass a Vehicle"),
+    (lambda fit, lap, model: sv.check(lap, model), "check: a Model .* pass its .vehicle"),
     (lambda fit, lap, model: sv.axle_forces("lap.csv", model.vehicle), "forces: a str .* read_log"),
     (lambda fit, lap, model: sv.axle_forces(lap, "car.toml"), "axle_forces: a str .* Vehicle"),
     (

@@ -221,3 +221,7 @@ def test_the_published_observer_refuses_what_cannot_be(vehicle, dt, sensors):
     with pytest.raises(sv.NumericalError, match="cannot bridge 10 s"):
         observer.step(10.0, *sensors[100])
     assert np.isfinite(observer.run(dt[100:], sensors[100:])[:, :2]).all()
+    missing = sensors[100].copy()
+    missing[4] = np.nan
+    with pytest.raises(sv.NumericalError, match=r"ay_mps2 is missing: leave .* dual observer"):
+        observer.step(0.01, *missing)

@@ -75,6 +75,7 @@ def core_seen(**changes: Any) -> object:
         "batch": None,
         "stride": 10,
         "scaled": [],
+        "starts": [],
     }
     return _core.observe14(**{**given, **changes})
 
@@ -98,6 +99,8 @@ def core_seen(**changes: Any) -> object:
         {"stride": 0},
         {"scaled": [24]},
         {"scaled": [1]},
+        {"starts": [[1, 6, 0.1]]},
+        {"starts": [[0, 36, 0.1]]},
         {"inputs": np.full((N, 24), np.nan)},
     ],
     ids=str,

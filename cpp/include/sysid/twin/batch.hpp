@@ -26,6 +26,10 @@ struct BatchParameter {
     // Not estimated but considered: the first guess stays, the others are estimated as if it were
     // exact, and their spreads hold what its uncertainty does to them. At most one.
     bool considered = false;
+    // Not a parameter but a state at the start: whoever runs the twins puts the step into that
+    // state of the one twin, `parameter` and the limits are not used. A state that forgets slowly
+    // keeps what it began with, and what the linear way to each new guess left in it.
+    bool start = false;
 };
 
 struct BatchChannel {

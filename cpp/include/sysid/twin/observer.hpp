@@ -19,6 +19,13 @@ struct StateGain {
     bool per_sample = false;
 };
 
+/// How one of the batch's twins starts beside the first, for a `BatchParameter::start`.
+struct StartStep {
+    std::size_t twin = 1;
+    std::size_t state = 0;
+    double step = 0.0;
+};
+
 /// What the observer recorded, every `stride` samples.
 struct Observation {
     std::vector<double> loads;     // kEstimates per row: a load and the scale of the inputs
@@ -34,6 +41,8 @@ struct TwinObserverSettings {
     std::size_t stride = 10;
     /// Inputs that the estimated scale multiplies, by their places in `Input14`; not the steering.
     std::vector<std::size_t> scaled;
+    /// Steps of the batch's parameters that are states at the start.
+    std::vector<StartStep> starts;
 };
 
 /// Runs the observer over `n` samples; `measured` has kReadings columns, NaN where nothing was

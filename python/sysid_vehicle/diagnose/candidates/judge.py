@@ -10,6 +10,7 @@ import numpy as np
 
 from ..._common.arguments import expect
 from ..._common.progress import doing
+from ..._common.typed import typed
 from ...effects import Effect
 from ...identify import Fit
 from ...rules import USUAL, Rules
@@ -22,6 +23,7 @@ from .verdicts import NAMED, ORDER, EffectVerdict, Finding, Verdicts, farthest, 
 Scored = tuple[tuple[Score, ...], Mapping[str, float], Mapping[str, Size]]
 
 
+@typed
 @doing("verdicts")
 def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
     """Give a verdict on every effect that a diagnosed model lacks.

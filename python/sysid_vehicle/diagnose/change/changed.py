@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..._common.typed import typed
 from ...effects import Effect
 from ...errors import InvalidInput
 from ...estimate import Driving
@@ -31,6 +32,7 @@ from .search import Search
 _LACKS = 2  # effects that are put into the model of a reference, at most
 
 
+@typed
 @explaining
 def changed(
     before: Fit,

@@ -17,6 +17,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.progress import with_progress
 from ..._common.text import HALF_95, brief, html_table, number, text_table, unit_after
 from ..._common.threads import Workers
+from ..._common.typed import typed
 from ...effects import Effect, base_parameters
 from ...errors import InvalidInput, NumericalError
 from ...identify import Fit, explaining
@@ -120,6 +121,7 @@ class BiasReport:
         return html_table(self._HEAD, self._rows())
 
 
+@typed
 @explaining
 def bias_report(
     fit: Fit,

@@ -9,6 +9,7 @@ import numpy as np
 
 from ... import manoeuvres
 from ..._common.arguments import check_positive
+from ..._common.typed import typed_fields
 from ...effects import length_beyond
 from ...errors import InvalidInput
 from ...manoeuvres import Manoeuvre, peak_lateral_mps2
@@ -41,6 +42,7 @@ class DriveLimits:
     area_m: tuple[float, float] | None = None
     duration_s: float = 120.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         limits = {"speed_mps": self.speed_mps, "lateral_mps2": self.lateral_mps2}
         check_positive("DriveLimits", **limits, duration_s=self.duration_s)

@@ -11,9 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from ..._common.arguments import check_positive
 from ..._common.printed import Part, Printed, Table
 from ..._common.progress import with_progress
 from ..._common.text import brief, few
+from ..._common.typed import typed
 from ...effects import Effect
 from ...errors import InvalidInput, NumericalError
 from ...estimate import Driving
@@ -185,6 +187,7 @@ def separations(
     return {(a.id, b.id): apart(a, b) for i, a in enumerate(shown) for b in shown[i + 1 :]}
 
 
+@typed
 @explaining
 def suggest_manoeuvre(
     fit: Fit,
@@ -223,10 +226,11 @@ def suggest_manoeuvre(
     Raises
     ------
     InvalidInput
-        The model has one of the effects already, one is named twice or has no rival, or the
-        driving cannot show it.
+        The model has one of the effects already, one is named twice or has no rival, the driving
+        cannot show it, or `enough` is not positive.
     """
     effects = _asked(fit, (first, *rivals))
+    check_positive("suggest_manoeuvre", enough=enough)
     psi = None if size is None else tuple(size)
     bounds = limits if limits is not None else DriveLimits.usual(fit.model.vehicle)
     fitted = Fitted.of(fit, effects) if psi is None else None

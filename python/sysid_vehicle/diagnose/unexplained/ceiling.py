@@ -20,6 +20,7 @@ from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import html_text
 from ..._common.threads import check_time
+from ..._common.typed import typed
 from ...estimate import Driving
 from ...identify import Fit, explaining
 from ...log import Log
@@ -110,6 +111,7 @@ class Ceiling:
         }
 
 
+@typed
 @explaining
 def ceiling(
     fit: Fit,

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray
 from ..._common.text import brief
+from ..._common.typed import typed
 from ...estimate import Driving
 from ...identify import Fit, explaining
 from ...log import Log
@@ -94,6 +95,7 @@ def _numbers(values: FloatArray) -> list[float | None]:
     return [float(f"{v:.6g}") if np.isfinite(v) else None for v in values]
 
 
+@typed
 @explaining
 def unknown(
     fit: Fit,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..._common.text import brief
 from ..._common.threads import Workers
+from ..._common.typed import typed
 from ...estimate import Driving
 from ...identify import Fit, explaining
 from ...log import Log
@@ -147,6 +148,7 @@ class Where:
         }
 
 
+@typed
 @explaining
 def where(
     fit: Fit,

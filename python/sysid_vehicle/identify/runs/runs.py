@@ -19,6 +19,7 @@ import scipy
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.printed import Part, Printed, Table
 from ..._common.text import brief, number, unit_after, with_error
+from ..._common.typed import typed
 from ...errors import InvalidInput, near_names
 from ...estimate import Driving, NoiseModel
 from ...log import Log
@@ -166,6 +167,7 @@ def _with_std(value: float, std: float) -> str:
     return f"{number(value)} +- {number(std, 2)}" if np.isfinite(std) else number(value)
 
 
+@typed
 @explaining
 def identify_runs(
     model: Model,

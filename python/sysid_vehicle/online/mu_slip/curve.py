@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ... import _core
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput
 
 
@@ -20,6 +21,7 @@ class MuSlipPrior:
     mean: tuple[float, ...]
     std: tuple[float, ...]
 
+    @typed_fields
     def __post_init__(self) -> None:
         if len(self.mean) != len(self.std):
             raise InvalidInput(
@@ -113,6 +115,7 @@ MAGIC_FORMULA = MuSlipCurve(
 at the origin as a multiple of mu_p / s_p (2 for the two-parameter curve)."""
 
 
+@typed
 def magic_formula_coefficients(values: Sequence[float]) -> tuple[float, float, float, float]:
     """B, C, D, E of the Magic Formula for parameters of :data:`MAGIC_FORMULA`."""
     return _core.magic_formula_coefficients(MAGIC_FORMULA.vector(values))

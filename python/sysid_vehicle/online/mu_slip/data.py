@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import brief
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput, near_names
 from ...read.formats.csv import read_table
 from .curve import TWO_PARAMETER, MuSlipCurve
@@ -48,6 +49,7 @@ class MuSlipData:
     mu: FloatArray
     noise_std: float | None = None
 
+    @typed_fields
     def __post_init__(self) -> None:
         for name in _COLUMNS:
             values = as_float64(getattr(self, name)).copy()
@@ -134,6 +136,7 @@ def at_least_one(name: str, count: int) -> int:
     return count
 
 
+@typed
 def sinusoidal_slip(
     mean: float = 0.2, amplitude: float = 0.2, periods: float = 3.0, readings: int = 300
 ) -> FloatArray:
@@ -168,6 +171,7 @@ def sinusoidal_slip(
     return as_float64(mean - amplitude * np.cos(phase))
 
 
+@typed
 def simulate_mu_slip(
     values: Sequence[float] = (0.35, 0.15),
     *,

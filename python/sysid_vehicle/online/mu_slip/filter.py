@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from .curve import TWO_PARAMETER, MuSlipCurve, MuSlipPrior
 from .data import MuSlipData, at_least_one, check_noise, check_values
@@ -42,6 +43,7 @@ class MuSlipFilter:
         Random walk of each parameter per reading, for surfaces that change; none if left out.
     """
 
+    @typed
     def __init__(
         self,
         noise_std: float,
@@ -92,6 +94,7 @@ class MuSlipFilter:
         return self._core.readings
 
 
+@typed
 def mu_slip_ekf(
     data: MuSlipData,
     *,
@@ -148,6 +151,7 @@ def mu_slip_ekf(
     )
 
 
+@typed
 def mu_slip_smooth(
     data: MuSlipData,
     *,

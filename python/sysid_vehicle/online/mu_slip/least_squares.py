@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from ...rules import USUAL
 from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
@@ -18,6 +19,7 @@ from .results import MuSlipEstimate, cautions
 _FEWEST = 20  # readings that the normal distribution of the ratio takes
 
 
+@typed
 def mu_slip_fit(
     data: MuSlipData,
     *,
@@ -86,6 +88,7 @@ def mu_slip_fit(
     )
 
 
+@typed
 def mu_slip_cramer_rao(
     slip: npt.ArrayLike,
     values: npt.ArrayLike,

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray
 from ..._common.files import read_toml, refuse_unknown
+from ..._common.typed import typed_fields
 from ...errors import InvalidInput
 from ...log import CHANNELS, listed
 from ..recording import Recording
@@ -46,6 +47,7 @@ class ChannelMap:
     rate_hz: float | None = None
     ground: Ground | None = None
 
+    @typed_fields
     def __post_init__(self) -> None:
         for channel, source in self.sources.items():
             if not isinstance(source, Source):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray
 from ..._common.files import as_path
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from ...log import CHANNELS, Columns, Log, standing
 from ...vehicle import Vehicle
@@ -35,6 +36,7 @@ _TURNED = ("yaw_rate_radps", "ay_mps2", "steer_rad")  # together, where the axes
 _FINER = ((0.5, 1.0), (500.0, 1e-3), (5e5, 1e-6), (np.inf, 1e-9))  # steps below, factor of time
 
 
+@typed
 def propose_channels(
     source: str | Path | Columns | Log,
     *,
