@@ -9,9 +9,10 @@ import numpy as np
 
 from ..._common.arrays import FloatArray
 from ..._common.files import as_path
-from ...errors import InvalidInput
+from ...errors import InvalidInput, warn
 from ...log import CHANNELS, Columns, Log, standing
 from ...vehicle import Vehicle
+from ..recording import Recording
 from ..registry import blamed, recognised
 from ..units import factor_to
 from .ground import PARTS
@@ -61,6 +62,11 @@ def propose_channels(
     ------
     InvalidInput
         If the log cannot be read.
+
+    Warns
+    -----
+    SysidWarning
+        Of what the file holds and nothing here reads.
     """
     from .. import contents
 
@@ -75,6 +81,8 @@ def propose_channels(
             if not is_path or as_path(source).name in str(error):
                 raise
             raise InvalidInput(f"{source}: {error}") from error
+        for left in held.left_out if isinstance(held, Recording) else ():
+            warn(f"{as_path(source).stem if is_path else 'log'}: {left}")
         view = View(held)
         chosen = {
             channel: found
