@@ -5,6 +5,7 @@ from .build import LEAST_USABLE_S
 from .channels import CHANNELS, MEASURED, Channel
 from .columns import Columns, as_floats, listed, named_columns
 from .held import held_rows
+from .interpolate import interpolated
 from .laws.laws import Contradiction
 from .log import Log, Retimed
 from .signals import standing
@@ -26,6 +27,7 @@ __all__ = [
     "check_excitation",
     "copies",
     "held_rows",
+    "interpolated",
     "listed",
     "named_columns",
     "seconds_of_stamps",

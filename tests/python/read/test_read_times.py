@@ -122,3 +122,36 @@ def test_times_of_32_bits_are_even(clock_s: float) -> None:
     assert log.rate_hz == pytest.approx(100.0, rel=2e-3)
     for channel, name in MAP.items():
         np.testing.assert_allclose(log[channel], SI[channel]["factor"] * columns[name])
+
+
+@pytest.mark.parametrize("delay_s", [0.0035, 0.015, -0.0123])
+def test_a_delay_in_the_map_leaves_white_noise_white(
+    delay_s: float, rng: np.random.Generator
+) -> None:
+    """A straight line between samples would look like a low-pass of the sensor."""
+    time_s = 0.01 * np.arange(6000)
+    noise = rng.normal(0.0, 0.03, time_s.size)
+    data = {
+        "time_s": time_s,
+        "vx_mps": np.full(time_s.size, 20.0),
+        "yaw_rate_radps": 0.1 * np.sin(time_s),
+        "ax_mps2": np.zeros(time_s.size),
+        "ay_mps2": 2.0 * np.sin(time_s - delay_s) + noise,
+        "steer_rad": 0.01 * np.sin(time_s),
+    }
+    log = read_log(data, {"ay_mps2": {"delay_s": delay_s}}, check=False)
+    left = (log["ay_mps2"] - 2.0 * np.sin(time_s))[20:-20]
+    assert np.std(left) == pytest.approx(0.03, rel=0.08)
+    assert abs(np.corrcoef(left[1:], left[:-1])[0, 1]) < 0.15
+
+
+def test_a_delayed_input_is_read_off_a_line() -> None:
+    """It may step, beside which a sharper interpolation would swing."""
+    time_s = 0.01 * np.arange(1000)
+    step = np.where(time_s < 5.0, 0.0, -3000.0)
+    data = {c: 20.0 + np.sin(time_s) for c in ("vx_mps", "yaw_rate_radps", "ay_mps2", "steer_rad")}
+    log = read_log(
+        {"time_s": time_s, **data, "fx_n": step}, {"fx_n": {"delay_s": 0.003}}, check=False
+    )
+    assert np.nanmin(log["fx_n"]) == -3000.0
+    assert np.nanmax(log["fx_n"]) == 0.0
