@@ -9,7 +9,7 @@ from .interpolate import interpolated
 from .laws.laws import Contradiction
 from .log import Log, Retimed
 from .signals import standing
-from .stamps import as_seconds, seconds_of_stamps
+from .stamps import as_seconds, counted_on, seconds_of_stamps
 from .together import check_excitation, copies, several_logs, unexcited
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "check_car",
     "check_excitation",
     "copies",
+    "counted_on",
     "held_rows",
     "interpolated",
     "listed",

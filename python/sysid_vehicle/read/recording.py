@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput, near_names
-from ..log import CHANNELS, listed
+from ..log import CHANNELS, counted_on, listed
 from .table import Table
 
 _SAME_TIME = 0.01  # of the shortest period: nearer samples of two channels are one row
@@ -297,13 +297,13 @@ def _spread(values: FloatArray, rows: npt.NDArray[np.intp], n: int) -> FloatArra
 
 def _ordered(name: str, signal: Signal, told: dict[str, str]) -> Signal:
     """Return the samples in the order of their times, each time once."""
-    time_s, values = signal.time_s, signal.values
+    time_s, values = counted_on(signal.time_s), signal.values
     step = np.diff(time_s)
     if not np.isfinite(time_s).all():
         k = int(np.flatnonzero(~np.isfinite(time_s))[0])
         raise InvalidInput(f"{name}: its time is not a number at sample {k}; mend the recording")
     if not step.size or (step > 0.0).all():
-        return signal
+        return Signal(time_s, values)
     k = int(np.argmin(step)) + 1
     if step[k - 1] < -_LATE_S:
         raise InvalidInput(

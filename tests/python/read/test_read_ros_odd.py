@@ -128,6 +128,12 @@ def test_bags_without_their_description(tmp_path: Path) -> None:
     path.write_bytes(b"SQLite format 3\0" + bytes(200))
     with pytest.raises(InvalidInput, match=r"no metadata\.yaml beside it.*ros2 bag reindex"):
         read_log(path, MAP)
+    other = tmp_path / "fleet.sqlite"
+    other.write_bytes(path.read_bytes())
+    with pytest.raises(
+        InvalidInput, match=r"an SQLite data base, but no ROS bag.*pandas\.read_sql"
+    ):
+        read_log(other, MAP)
     with pytest.raises(InvalidInput, match=r"a folder without metadata\.yaml, so no ROS 2 bag"):
         read_log(tmp_path, MAP)
     bag = tmp_path / "run.bag"

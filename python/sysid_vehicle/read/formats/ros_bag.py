@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from ..._common.files import read_bytes
 from ...errors import InvalidInput
 from ..recording import LeftOut, Recording
 from .messages import Taken, recording_of
@@ -13,6 +14,12 @@ from .messages import Taken, recording_of
 
 def read(path: Path, dbc: Path | None) -> Recording:
     """List the numbers in the first message of each topic whose type is known."""
+    if path.is_file() and path.suffix != ".db3" and read_bytes(path, 6) == b"SQLite":
+        raise InvalidInput(
+            f"{path}: is an SQLite data base, but no ROS bag, whose files are called .db3; give "
+            f"read_log the table that pandas reads from it: pandas.read_sql('SELECT * FROM ...', "
+            f"sqlite3.connect(path))"
+        )
     if path.suffix == ".db3" and not (path.parent / "metadata.yaml").exists():
         raise InvalidInput(
             f"{path}: has no metadata.yaml beside it, which tells its topics; make it with "

@@ -23,6 +23,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"^(t|ts|zeit|(time ?)?stamps?( s| sec\w*)?|times?|tout|utc time)$",
         r"^(temps|tempo|tiempo|tijd|tid|時間|時刻|时间)$",
         r"\btime\b|^(header )?stamp\b|^(sec(ond)?s|elapsed|epoch)\b",
+        r"\bi? ?tow\b|\bsow\b|\bseconds? of (the )?(week|day)\b",
     ),
     "vx_mps": (
         r"^[uv] ?x( mps)?$",
