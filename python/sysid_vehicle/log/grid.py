@@ -118,7 +118,7 @@ def to_grid(
         The columns on that grid: as they were if time was uniform to 1 %. Else each is
         interpolated between its own samples, at the rate of the quickest channel, with NaN in its
         holes and inside gaps of more than five steps: linearly, or where a measured channel has
-        even samples of its own as `interpolated` does, which leaves white noise white. A channel
+        a rate of its own as `interpolated` does, which leaves white noise white. A channel
         that is sampled more slowly than the grid keeps as many values as it had, each at the
         nearest grid point.
     note : str
@@ -156,7 +156,7 @@ def to_grid(
 
 
 def _are_several_clocks(time_s: FloatArray, columns: Mapping[str, FloatArray]) -> bool:
-    """Tell whether channels of even samples have their rows between each other's.
+    """Tell whether channels with rates of their own have their rows between each other's.
 
     Two of 100 Hz that are 4 ms apart make steps of 4 and 6 ms, which look like 5 ms that were
     rounded to whole ones.

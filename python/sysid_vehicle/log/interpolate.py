@@ -15,7 +15,7 @@ from .._common.arrays import FloatArray
 
 _HALF_TAPS = 8  # of the interpolation, on either side
 _KAISER = 6.0  # its window's shape
-_JITTER = 0.01  # of the period, up to which samples count as even
+_JITTER = 0.5  # of the period, below which the place of each sample is known
 _SAME = 1e-6  # of the period: as near a sample it is that sample
 _ROWS = 1 << 15  # that are worked on at once
 # What times are written in: decimals, or the bits that numbers of 32 bits have after hours.
@@ -37,7 +37,7 @@ def quantum_of(time_s: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Even:
-    """Even times, ``begin_s + period_s place + late_s``.
+    """Times at a rate, ``begin_s + period_s place + late_s``.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Even:
     place : ndarray of int, shape (n,)
         Rising; places may be left out, as where samples are lost.
     late_s : ndarray, shape (n,)
-        What is left, within 1 % of the period; nothing where the times were only rounded.
+        What is left, less than half a period; nothing where the times were only rounded.
     """
 
     begin_s: float
@@ -55,7 +55,7 @@ class Even:
 
 
 def evenness(time_s: FloatArray) -> Even | None:
-    """Return rising times, shape (n,), as even ones; None where they are uneven."""
+    """Return rising times, shape (n,), as those of a rate; None where they have none."""
     if time_s.size < 2 * _HALF_TAPS:
         return None
     usual = float(np.median(np.diff(time_s)))
@@ -65,7 +65,7 @@ def evenness(time_s: FloatArray) -> Even | None:
     off = float(np.abs(late).max())
     if off <= ROUNDED * quantum_of(time_s) < 0.5 * period:
         late = np.zeros(time_s.size)
-    elif off > _JITTER * period:
+    elif off >= _JITTER * period:
         return None
     if (np.diff(place) < 1.0).any():
         return None
@@ -75,8 +75,9 @@ def evenness(time_s: FloatArray) -> Even | None:
 def interpolated(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
     """Return the values of a channel at other times, by a sinc in a Kaiser window.
 
-    Where the window reaches beyond the ends or over a hole, and of samples at uneven times, a
-    straight line takes its place. Beyond the ends nothing is known.
+    Samples that are a little early or late are moved to their even times along the slope there,
+    which adds little noise. Where the window reaches beyond the ends or over a hole, and of samples
+    at no rate, a straight line takes its place. Beyond the ends nothing is known.
 
     Parameters
     ----------
@@ -120,11 +121,18 @@ def interpolated(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> Fl
 
 
 def _taps(part: FloatArray) -> FloatArray:
-    """Weights of the samples around each time, shape (n, taps); `part` of a period behind one."""
+    """Weights of the samples around each time, shape (n, taps); `part` of a period behind one.
+
+    What the window takes from constants and straight lines is given back.
+    """
     constant = part.size > 1 and np.ptp(part) < _SAME
-    place = (part[:1] if constant else part)[:, None] - _LAGS
+    place = _LAGS - (part[:1] if constant else part)[:, None]
     inside = np.sqrt(np.maximum(1.0 - (place / (_HALF_TAPS + 0.5)) ** 2, 0.0))
-    taps = np.sinc(place) * np.i0(_KAISER * inside)
+    window = np.i0(_KAISER * inside)
+    taps = np.sinc(place) * window
     taps /= taps.sum(axis=1, keepdims=True)
+    w0, w1, w2 = (np.sum(window * place**k, axis=1, keepdims=True) for k in range(3))
+    off = np.sum(taps * place, axis=1, keepdims=True)
+    taps += off * window * (w1 - w0 * place) / (w0 * w2 - w1**2)
     weights: FloatArray = np.broadcast_to(taps, (part.size, _LAGS.size))
     return weights

@@ -145,6 +145,25 @@ class TestSeveralClocks:
         assert abs(np.mean(noise * np.cos(3.0 * log["time_s"][20:-20]))) < 0.0015  # 0.25 ms
         np.testing.assert_allclose(log["steer_rad"], 0.05 * np.sin(log["time_s"]), atol=1e-9)
 
+    def test_stamps_that_jitter_and_drift(self, rng: np.random.Generator) -> None:
+        """Two devices, the second 3 ms later, 100 ppm slow, its stamps up to 2 ms off."""
+        even = 0.01 * np.arange(6000)
+        other = 1.0001 * even + 0.003 + rng.uniform(-0.002, 0.002, even.size)
+        time_s = np.union1d(even, other)
+        values = columns(time_s)
+        values["vx_mps"] = 20.0 + np.sin(3.0 * time_s) + rng.normal(0.0, 0.03, time_s.size)
+        for name in values:
+            if name != "time_s":
+                own = other if name == "vx_mps" else even
+                values[name] = np.where(np.isin(time_s, own), values[name], np.nan)
+        with pytest.warns(SysidWarning, match="resampled at 1"):
+            log = make(values)
+        noise = (log["vx_mps"] - 20.0 - np.sin(3.0 * log["time_s"]))[20:-20]
+        noise = noise[np.isfinite(noise)]
+        assert noise.size > 5900
+        assert np.std(noise) == pytest.approx(0.03, rel=0.08)
+        assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.15
+
     def test_half_a_period_apart_is_a_log_of_twice_the_rate(self, rng: np.random.Generator) -> None:
         """Each sample then stands at its own time, and nothing is interpolated but the inputs."""
         given = self.rows(5, rng)
