@@ -10,7 +10,7 @@ import numpy as np
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput
 from .channels import CHANNELS, MEASURED
-from .interpolate import QUANTA, ROUNDED, evenness, interpolated
+from .interpolate import ROUNDED, evenness, interpolated, quantum_of
 
 _JITTER = 0.01  # relative step variation up to which a log counts as uniform
 _GAP_STEPS = 5.0
@@ -218,17 +218,16 @@ def is_slow(period: float, dt: float) -> bool:
 
 def _is_rounded(time_s: FloatArray, mean_step: float) -> bool:
     """Tell whether uneven steps come only from writing an even time with few decimals, or bits."""
-    for quantum in QUANTA:
-        ticks = time_s / quantum
-        if np.abs(ticks - np.round(ticks)).max() < 1e-3:
-            steps = np.diff(np.round(ticks))
-            usual = np.median(steps)
-            if np.all(steps % usual == 0.0) and np.count_nonzero(steps > usual) < _BEATS:
-                return False  # so few longer steps are lost rows: a rate a hair off is rarer
-            index = np.arange(time_s.size)
-            line = np.polyval(np.polyfit(index, time_s - time_s[0], 1), index) + time_s[0]
-            return bool(quantum < mean_step and np.abs(time_s - line).max() <= ROUNDED * quantum)
-    return False
+    quantum = quantum_of(time_s)
+    if not quantum:
+        return False
+    steps = np.diff(np.round(time_s / quantum))
+    usual = np.median(steps)
+    if np.all(steps % usual == 0.0) and np.count_nonzero(steps > usual) < _BEATS:
+        return False  # so few longer steps are lost rows: a rate a hair off is rarer
+    index = np.arange(time_s.size)
+    line = np.polyval(np.polyfit(index, time_s - time_s[0], 1), index) + time_s[0]
+    return bool(quantum < mean_step and np.abs(time_s - line).max() <= ROUNDED * quantum)
 
 
 def _note(time_s: FloatArray, step: FloatArray, dt: float, slow: Mapping[str, float]) -> str:

@@ -19,7 +19,7 @@ _JITTER = 0.5  # of the period, below which the place of each sample is known
 _SAME = 1e-6  # of the period: as near a sample it is that sample
 _ROWS = 1 << 15  # that are worked on at once
 # What times are written in: decimals, or the bits that numbers of 32 bits have after hours.
-QUANTA = (*(10.0**-k for k in range(2, 7)), *(2.0**-k for k in range(4, 16)))
+_QUANTA = (*(10.0**-k for k in range(2, 7)), *(2.0**-k for k in range(4, 16)))
 ROUNDED = 0.55
 """Of a quantum, by which times that are written in it are off a straight line."""
 
@@ -28,7 +28,7 @@ _LAGS = np.arange(-_HALF_TAPS + 1, _HALF_TAPS + 1)
 
 def quantum_of(time_s: FloatArray) -> float:
     """Return the largest quantum of which all times are multiples; 0 if there is none."""
-    for quantum in QUANTA:
+    for quantum in _QUANTA:
         ticks = time_s / quantum
         if np.abs(ticks - np.round(ticks)).max() < 1e-3:
             return quantum
