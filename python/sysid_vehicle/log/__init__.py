@@ -5,10 +5,11 @@ from .build import LEAST_USABLE_S
 from .channels import CHANNELS, MEASURED, Channel
 from .columns import Columns, as_floats, listed, named_columns
 from .held import held_rows
+from .interpolate import interpolated
 from .laws.laws import Contradiction
 from .log import Log, Retimed
 from .signals import standing
-from .stamps import as_seconds, seconds_of_stamps
+from .stamps import as_seconds, counted_on, seconds_of_stamps
 from .together import check_excitation, copies, several_logs, unexcited
 
 __all__ = [
@@ -25,7 +26,9 @@ __all__ = [
     "check_car",
     "check_excitation",
     "copies",
+    "counted_on",
     "held_rows",
+    "interpolated",
     "listed",
     "named_columns",
     "seconds_of_stamps",

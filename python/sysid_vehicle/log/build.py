@@ -18,6 +18,7 @@ from .held import blank_held
 from .laws.plausibility import check_coherence
 from .laws.ranges import dropouts
 from .signals import fill_short_gaps, spikes
+from .stamps import counted_on
 from .standing import blank_standing
 
 LEAST_STRETCH_S = 1.0
@@ -72,6 +73,7 @@ def _build(
     time_s = columns.pop("time_s")
     if time_s.size < 2:
         raise InvalidInput(f"time_s: only {time_s.size} sample(s); give a log of at least two")
+    time_s = counted_on(time_s)
     check_time(time_s)
     if abs(time_s[0]) > _CLOCK_S:
         time_s = time_s - time_s[0]

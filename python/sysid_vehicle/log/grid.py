@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import combinations
 
 import numpy as np
 
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput
-from .channels import CHANNELS
+from .channels import CHANNELS, MEASURED
+from .interpolate import ROUNDED, evenness, interpolated, quantum_of
 
 _JITTER = 0.01  # relative step variation up to which a log counts as uniform
 _GAP_STEPS = 5.0
@@ -19,8 +21,6 @@ _FINER = ((400.0, "milli", "0.001"), (4e5, "micro", "1e-6"), (np.inf, "nano", "1
 _SHORTEST_S = 1e-5  # no car is logged at 100 kHz: 0.5 s is more than that in days
 _MIN_STEP = 1e-6  # of the usual step: below, two rows are one that was written twice
 _OWN_GAP = 1.5  # a channel is interpolated between samples that are no farther apart, in periods
-# What times are written in: decimals, or the bits that numbers of 32 bits have after hours.
-_QUANTA = (*(10.0**-k for k in range(2, 7)), *(2.0**-k for k in range(4, 16)))
 _BEATS = 5  # longer steps, evenly spaced, that show a step of no whole number of decimals
 _MAX_GROWTH = 20  # a grid this many times longer than the log means a broken time channel
 
@@ -116,9 +116,11 @@ def to_grid(
         Uniform time.
     columns : dict of ndarray, shape (m,)
         The columns on that grid: as they were if time was uniform to 1 %. Else each is
-        interpolated linearly between its own samples, at the rate of the quickest channel, with
-        NaN in its holes and inside gaps of more than five steps. A channel that is sampled more
-        slowly than the grid keeps as many values as it had, each at the nearest grid point.
+        interpolated between its own samples, at the rate of the quickest channel, with NaN in its
+        holes and inside gaps of more than five steps: linearly, or where a measured channel has
+        a rate of its own as `interpolated` does, which leaves white noise white. A channel
+        that is sampled more slowly than the grid keeps as many values as it had, each at the
+        nearest grid point.
     note : str
         What was done, in words; empty if nothing had to be done.
     """
@@ -127,7 +129,8 @@ def to_grid(
     even = np.linspace(time_s[0], time_s[-1], n)
     mean_step = (time_s[-1] - time_s[0]) / (n - 1)
     regular = np.abs(step / mean_step - 1.0).max() <= _JITTER
-    if regular or _is_rounded(time_s, mean_step):
+    several = not regular and _are_several_clocks(time_s, columns)
+    if regular or (not several and _is_rounded(time_s, mean_step)):
         return even, dict(columns), ""
 
     periods = {name: own_period(time_s, values) for name, values in columns.items()}
@@ -144,14 +147,33 @@ def to_grid(
         )
     grid = time_s[0] + dt * np.arange(count)
     result = {
-        name: _on_grid(grid, dt, time_s, values, periods[name]) for name, values in columns.items()
+        name: _on_grid(grid, dt, time_s, values, periods[name], sharp=name in MEASURED)
+        for name, values in columns.items()
     }
     slow = {name: p for name, p in periods.items() if name in CHANNELS and is_slow(p, dt)}
-    return grid, result, _note(time_s, step, dt, slow)
+    remedy = "trigger all sensors by one clock" if several else "record at a fixed rate"
+    return grid, result, f"{_note(time_s, step, dt, slow)}; {remedy} to avoid this"
+
+
+def _are_several_clocks(time_s: FloatArray, columns: Mapping[str, FloatArray]) -> bool:
+    """Tell whether channels with rates of their own have their rows between each other's.
+
+    Two of 100 Hz that are 4 ms apart make steps of 4 and 6 ms, which look like 5 ms that were
+    rounded to whole ones.
+    """
+    masks = {np.isfinite(x).tobytes(): np.isfinite(x) for c, x in columns.items() if c in CHANNELS}
+    even = [mask for mask in masks.values() if evenness(time_s[mask]) is not None]
+    return any(not (a & b).any() for a, b in combinations(even, 2))
 
 
 def _on_grid(
-    grid: FloatArray, dt: float, time_s: FloatArray, values: FloatArray, period: float
+    grid: FloatArray,
+    dt: float,
+    time_s: FloatArray,
+    values: FloatArray,
+    period: float,
+    *,
+    sharp: bool,
 ) -> FloatArray:
     """Interpolate one channel between its own samples, never across its holes."""
     rows = np.flatnonzero(np.isfinite(values))
@@ -174,6 +196,10 @@ def _on_grid(
         mixed = np.where(
             weight == 0.0, known[left], np.where(weight == 1.0, known[left + 1], mixed)
         )
+        if sharp:
+            between = np.flatnonzero(known_there & (weight != 0.0) & (weight != 1.0))
+            better = interpolated(own, known, grid[between])
+            mixed[between] = np.where(np.isfinite(better), better, mixed[between])
         result[known_there] = mixed[known_there]
     if not is_slow(period, dt) and rows.size > 1:
         return result
@@ -192,17 +218,16 @@ def is_slow(period: float, dt: float) -> bool:
 
 def _is_rounded(time_s: FloatArray, mean_step: float) -> bool:
     """Tell whether uneven steps come only from writing an even time with few decimals, or bits."""
-    for quantum in _QUANTA:
-        ticks = time_s / quantum
-        if np.abs(ticks - np.round(ticks)).max() < 1e-3:
-            steps = np.diff(np.round(ticks))
-            usual = np.median(steps)
-            if np.all(steps % usual == 0.0) and np.count_nonzero(steps > usual) < _BEATS:
-                return False  # so few longer steps are lost rows: a rate a hair off is rarer
-            index = np.arange(time_s.size)
-            line = np.polyval(np.polyfit(index, time_s - time_s[0], 1), index) + time_s[0]
-            return bool(quantum < mean_step and np.abs(time_s - line).max() <= 0.55 * quantum)
-    return False
+    quantum = quantum_of(time_s)
+    if not quantum:
+        return False
+    steps = np.diff(np.round(time_s / quantum))
+    usual = np.median(steps)
+    if np.all(steps % usual == 0.0) and np.count_nonzero(steps > usual) < _BEATS:
+        return False  # so few longer steps are lost rows: a rate a hair off is rarer
+    index = np.arange(time_s.size)
+    line = np.polyval(np.polyfit(index, time_s - time_s[0], 1), index) + time_s[0]
+    return bool(quantum < mean_step and np.abs(time_s - line).max() <= ROUNDED * quantum)
 
 
 def _note(time_s: FloatArray, step: FloatArray, dt: float, slow: Mapping[str, float]) -> str:
@@ -236,4 +261,4 @@ def _note(time_s: FloatArray, step: FloatArray, dt: float, slow: Mapping[str, fl
             f"first before {at(first + 1, time_s)}; the gaps hold NaN now, and no run of the "
             f"model crosses one longer than 0.1 s"
         )
-    return "time_s: " + "; it also ".join(parts) + "; record at a fixed rate to avoid this"
+    return "time_s: " + "; it also ".join(parts)

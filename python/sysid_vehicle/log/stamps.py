@@ -12,11 +12,12 @@ from .._common.arrays import FloatArray, as_array
 
 _STAMP = re.compile(
     r"(\d{4}-\d\d-\d\d[T ]|\d\d?[./]\d\d?[./]\d{4} )?"
-    r"(\d\d?:\d\d:\d\d(?:[.,]\d+)?) ?([AP]M)? ?(Z|[+-]\d\d:?\d\d)?",
+    r"(\d\d?:\d\d:\d\d(?:[.,]\d+|:\d{3})?) ?([AP]M)? ?(Z|[+-]\d\d:?\d\d)?",
     re.I,
 )
 _MINUTES = re.compile(r"(\d+):(\d\d[.,]\d+)")  # of a lap, or how spreadsheets show a time of day
-_DAY_S, _HOUR_S = 86400.0, 3600.0
+_DAY_S, _HOUR_S, _WEEK_S = 86400.0, 3600.0, 604800.0
+_TURN_S = 1.0  # readings on both sides of the end of a day or a week are nearer to it
 _YEAR_LAST = re.compile(r"(\d\d?)[./](\d\d?)[./](\d{4})T(.*)")
 
 
@@ -91,7 +92,8 @@ def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
 
 def _of_day(clock: str, half: str | None) -> str:
     """A time of day as ISO 8601 has it; `half` is the half of the day, if it has twelve hours."""
-    hour, rest = clock.replace(",", ".").split(":", 1)
+    hour, minute, rest = clock.replace(",", ".").split(":", 2)
+    rest = f"{minute}:{rest.replace(':', '.')}"  # milliseconds behind a colon
     if half is not None:
         hour = str(int(hour) % 12 + 12 * (half.upper() == "PM"))
     return f"{hour.zfill(2)}:{rest}"
@@ -123,6 +125,19 @@ def _counted_on(seconds: FloatArray, period_s: float) -> FloatArray:
     ends = np.diff(seconds[there]) < -0.5 * period_s
     result[there[1:]] += period_s * np.cumsum(ends)
     return result
+
+
+def counted_on(seconds: FloatArray) -> FloatArray:
+    """Return times [s] that begin from 0 again, as seconds of the day or the week do, counted on.
+
+    Others are returned as they are.
+    """
+    back = np.flatnonzero(np.diff(seconds) < 0.0)
+    for period_s in (_DAY_S, _WEEK_S):
+        before, after = seconds[back] - period_s, seconds[back + 1]
+        if back.size and (np.abs(before) <= _TURN_S).all() and (np.abs(after) <= _TURN_S).all():
+            return _counted_on(seconds, period_s)
+    return seconds
 
 
 def _times(stamps: Sequence[str], day_at: int, east_s: FloatArray) -> FloatArray | None:

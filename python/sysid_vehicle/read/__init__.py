@@ -13,6 +13,7 @@ from ..log import Columns, Log
 from ..vehicle import Vehicle
 from .formats.csv import read_table
 from .formats.objects import contents_of_object
+from .long_table import recording_of_long
 from .mapping.channel_map import ChannelMap
 from .mapping.ground import Ground
 from .mapping.proposal import Proposal
@@ -58,8 +59,9 @@ def read_log(
     source : str, Path or table
         The file, or the folder of a ROS 2 bag. In text the first line names the columns; an empty
         cell or ``nan`` is a missing measurement, lines that begin with ``#`` are comments, a second
-        line may state units, times may be ISO 8601 stamps. In memory: a dict of arrays, or of pairs
-        of times [s] and values; a table of pandas, polars or Arrow; a data set of xarray.
+        line may state units, times may be ISO 8601 stamps. Long tables, with a row for each
+        reading and a column of the channels' names, are read too. In memory: a dict of arrays, or
+        of pairs of times [s] and values; a table of pandas, polars or Arrow; a data set of xarray.
     channels : str, Path, mapping or ChannelMap, optional
         Channel map for a log with other names or units: a TOML file, the content of its
         ``[channels]`` table, or the map itself. Units that the file states are converted where the
@@ -112,6 +114,14 @@ def contents(
     source: str | Path | Columns, dbc: str | Path | None, entry: Format | None
 ) -> Table | Recording:
     """Return what a file or an object holds, under its own names."""
+    held = _held(source, dbc, entry)
+    long = recording_of_long(held) if isinstance(held, Table) else None
+    return held if long is None else long
+
+
+def _held(
+    source: str | Path | Columns, dbc: str | Path | None, entry: Format | None
+) -> Table | Recording:
     if not isinstance(source, (str, Path)):
         return contents_of_object(source)
     if dbc is not None and (entry is None or entry.module not in _OF_FRAMES):

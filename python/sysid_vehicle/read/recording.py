@@ -10,12 +10,13 @@ import numpy.typing as npt
 
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput, near_names
-from ..log import CHANNELS, listed
+from ..log import CHANNELS, counted_on, listed
 from .table import Table
 
 _SAME_TIME = 0.01  # of the shortest period: nearer samples of two channels are one row
 _LATE_S = 1.0  # messages overtake each other by less; a clock that was set back, by more
 _LISTED_EXTRAS = 1000  # other channels of the groups that are read
+_TOLD = 6  # names of what is left out
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,40 @@ class Entry:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """What a file holds and nothing here reads: told once, and where a channel map names it.
+
+    Attributes
+    ----------
+    what : str
+        Singular, such as ``topic``.
+    names : mapping of str
+        By name in the file, of what kind it is; empty where that says nothing.
+    why : str
+        Why it is left out, behind "is left out" or "are left out".
+    remedy : str
+    """
+
+    what: str
+    names: Mapping[str, str]
+    why: str
+    remedy: str
+
+    def __str__(self) -> str:
+        told = [f"{name} ({kind})" if kind else name for name, kind in self.names.items()]
+        more = ", ..." if len(told) > _TOLD else ""
+        count = f"1 {self.what} is" if len(told) == 1 else f"{len(told)} {self.what}s are"
+        return f"{count} left out, {self.why}: {', '.join(told[:_TOLD])}{more}; {self.remedy}"
+
+    def holds(self, name: str) -> bool:
+        """Tell whether what a channel map calls `name` is, or is part of, what is left out."""
+        return any(
+            ends_with(full, name) or name.startswith((f"{full}/", f"{full}."))
+            for full in self.names
+        )
+
+
+@dataclass(frozen=True)
 class Recording:
     """Channels of a file or an object, each with its own times; read when they are asked for.
 
@@ -58,11 +93,13 @@ class Recording:
     clocked : callable, optional
         Where a time is an array like any other: gives the same channels, of which those that are as
         long as the array called so have it for their time, or, with a rate [Hz], are sampled so.
+    left_out : tuple of LeftOut
     """
 
     entries: Mapping[str, Entry]
     fetch: Callable[[list[str], list[str]], Mapping[str, Signal]]
     clocked: Callable[[str, float | None], Recording] | None = None
+    left_out: tuple[LeftOut, ...] = ()
 
     def resolve(self, name: str, channel: str) -> str:
         """Return the full name of what a channel map calls `name`: in full, or its last parts.
@@ -82,6 +119,11 @@ class Recording:
                 f"{channel}: the channel map names '{name}', which is the last part of "
                 f"{len(found)} channels; name one in full: {listed(found)}"
             )
+        unread = next((left for left in self.left_out if left.holds(name)), None)
+        if unread is not None:
+            raise InvalidInput(
+                f"{channel}: the channel map names '{name}', which cannot be read; {unread}"
+            )
         hint = near_names(name, self.entries)
         raise InvalidInput(
             f"{channel}: the channel map names '{name}', which is not in the file{hint}; channels "
@@ -90,7 +132,7 @@ class Recording:
 
     def signals(self, names: list[str], notes: list[str]) -> dict[str, Signal]:
         """Read some channels, their samples in the order of time."""
-        found = self.fetch(names, notes)
+        found = self.fetch(names, notes) if names else {}  # to libraries none are all
         told: dict[str, str] = {}
         result = {name: _ordered(name, found[name], told) for name in names}
         notes += told.values()
@@ -117,6 +159,7 @@ class Recording:
         InvalidInput
             If a channel is not there, or its times cannot be used.
         """
+        notes += map(str, self.left_out)
         source = {channel: self.resolve(name, channel) for channel, name in wanted.items()}
         skipped = {*absent, "time_s", *wanted}
         own = [channel for channel in CHANNELS if channel not in skipped]
@@ -254,13 +297,13 @@ def _spread(values: FloatArray, rows: npt.NDArray[np.intp], n: int) -> FloatArra
 
 def _ordered(name: str, signal: Signal, told: dict[str, str]) -> Signal:
     """Return the samples in the order of their times, each time once."""
-    time_s, values = signal.time_s, signal.values
+    time_s, values = counted_on(signal.time_s), signal.values
     step = np.diff(time_s)
     if not np.isfinite(time_s).all():
         k = int(np.flatnonzero(~np.isfinite(time_s))[0])
         raise InvalidInput(f"{name}: its time is not a number at sample {k}; mend the recording")
     if not step.size or (step > 0.0).all():
-        return signal
+        return Signal(time_s, values)
     k = int(np.argmin(step)) + 1
     if step[k - 1] < -_LATE_S:
         raise InvalidInput(

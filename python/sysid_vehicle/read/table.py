@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -55,6 +55,8 @@ class Table:
         Columns of time stamps, as seconds since the first.
     notes : tuple of str
         What was corrected while reading.
+    texts : mapping of sequence
+        Cells of the columns that hold neither numbers nor stamps.
     """
 
     names: tuple[str, ...]
@@ -64,6 +66,7 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict)
     seconds: Mapping[str, FloatArray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    texts: Mapping[str, Sequence[Any]] = field(default_factory=dict)
 
     @cached_property
     def counts(self) -> Counter[str]:
@@ -117,6 +120,7 @@ def table_of(data: object) -> Table:
     columns: dict[str, FloatArray] = {}
     not_numbers: dict[str, BadCell] = {}
     seconds: dict[str, FloatArray] = {}
+    texts: dict[str, Sequence[Any]] = {}
     pairs = [(name, _one_dimensional(raw)) for name, raw in named_columns(data)]
     name, index = _index(data, dict(pairs))
     if index is not None and _is_time(index, name):
@@ -134,9 +138,12 @@ def table_of(data: object) -> Table:
         elif name not in columns:
             cells = np.asarray(raw, dtype=object).ravel()
             not_numbers[name] = _first_bad(cells)
+            if stamps is None and np.ndim(cells) == 1:
+                texts[name] = list(cells)
     n = max((values.size for values in (*columns.values(), *seconds.values())), default=0)
     names = tuple(name for name, _ in pairs)
-    return Table(names, columns, not_numbers, n, _stated_units(data, pairs), seconds)
+    units = _stated_units(data, pairs)
+    return Table(names, columns, not_numbers, n, units, seconds, texts=texts)
 
 
 def _one_dimensional(raw: Any) -> Any:

@@ -113,6 +113,18 @@ _QUOTIENT = re.compile(r"^(.*[^\W_])[\s_.]+([A-Za-z]+)[\s_]([A-Za-z]+2?)$")
 # Units that are words of other meanings in names.
 _WORDS = {"turn", "turns", "rev", "revs", "min", "h", "grad"}
 _AT_END = re.compile(r"[\[({]([^\[\](){}]+)[\])}]\s*$")
+# Words of units that are spelled out.
+_SPELLED = tuple(
+    (re.compile(rf"\b{word}\b"), short)
+    for word, short in (
+        ("kilomet(?:er|re)s?", "km"),
+        ("met(?:er|re)s?", "m"),
+        ("hours?", "h"),
+        ("seconds?|secs?", "s"),
+        ("degrees?", "deg"),
+        ("radians?", "rad"),
+    )
+)
 _NONE = {"", "-", "1", "none", "null", "n/a", "na", "[]", "unitless", "no_unit", "nounit"}
 
 
@@ -123,8 +135,11 @@ def plain(text: str) -> str:
     before that word.
     """
     text = text.replace("Â°", "°").replace("Â²", "²").partition(" since ")[0]
+    text = text.replace("º", "°").replace("⁻", "-").replace("¹", "1").replace(" per ", "/")
     text = text.strip().strip("[](){}").replace(" ", "").replace("²", "2").replace("^", "")
     text = text.replace("**", "").replace("*", "").replace("·", "").replace("s-2", "s2").lower()
+    for word, short in _SPELLED:
+        text = word.sub(short, text)
     return {"m/s-2": "m/s2", "ms2": "m/s2"}.get(text, text)
 
 

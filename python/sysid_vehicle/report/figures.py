@@ -39,10 +39,10 @@ def overlay(study: Study, samples: Samples, caption: str) -> str:
                 signals,
                 ["measured", *names],
                 ("measured", *LOOKS),
-                112,
+                108,
                 f"{shown.name} [{shown.unit}]",
             ),
-            (left, names, LOOKS, 56, ""),
+            (left, names, LOOKS, 52, ""),
         ):
             chart = Chart(
                 768, height, view, samples.range(*columns, rows=inside), title=title,
@@ -65,7 +65,7 @@ def _whole(samples: Samples, names: Sequence[str]) -> Chart:
     t = samples["t"]
     top = samples.range(*columns)[1]
     chart = Chart(
-        768, 76, (float(t[0]), float(t[-1])), (0.0, top), ylabel="/ floor", link="t",
+        768, 72, (float(t[0]), float(t[-1])), (0.0, top), ylabel="/ floor", link="t",
         xlabel=samples.time_label,
     )  # fmt: skip
     within = t[samples.inside]

@@ -9,7 +9,7 @@ from ..study import AddedEffect, Study, left_out
 from . import figures
 from .page import bars, bullets, panel, paragraph, table
 from .samples import Samples
-from .words import errors, interval, quantity, shown_in, stages, summary
+from .words import interval, quantity, shown_in, stages, summary
 
 _AHEAD_S = 1.0
 _CANDIDATES = 5
@@ -37,9 +37,8 @@ def first_screen(study: Study, samples: Samples | None) -> list[str]:
 def _compare(study: Study, samples: Samples) -> str:
     excerpt = samples.excerpt
     caption = (
-        f"{excerpt.log}, validation data: the seconds in which the baseline is worst, predicted "
-        f"{excerpt.horizon_s:g} s ahead from what was known by then and the inputs since. Below: "
-        "the one-step error of all the driving."
+        f"{excerpt.log}, validation data: the baseline's worst seconds, predicted "
+        f"{excerpt.horizon_s:g} s ahead. Below: one-step error."
     )
     return panel("1 Compare", [figures.overlay(study, samples, caption)], 7)
 
@@ -78,13 +77,17 @@ def _which(study: Study) -> str:
     for e in order:
         text = f"{100.0 * max(gone[e], 0.0):.0f} %"
         if e in probable:
-            text += f", probability {probable[e]:.2f}"
+            text += f" ({probable[e]:.2f})"
         rows.append((e, gone[e], text, "" if e in own else "mute"))
     text = (
         "Share of the baseline's one-step error beyond the noise floor on validation data that "
         "each effect removes if it alone is added. "
         f"{len(study.diagnoses[0].ranking)} were scored, {len(tried)} refitted."
-        + (" Probability: that it is missing, by the training data." if probable else "")
+        + (
+            " In brackets: probability that it is missing, by the training data."
+            if probable
+            else ""
+        )
     )
     if own:
         text += " Grey: not added."
@@ -149,7 +152,7 @@ def _falls(study: Study) -> str:
             lines.append([f"{shown.name} [{shown.unit}]", *figures_])
     parts = [
         bars([*rows, ("noise floor", 1.0 / top, "1.00", "mute")]),
-        paragraph(f"On validation data the one-step error {errors(study)}."),
+        paragraph("One-step error on validation data, of the noise floor."),
     ]
     if lines:
         models = [title.removesuffix(" model") for title, _ in stages(study)]

@@ -8,12 +8,10 @@ import numpy as np
 import scipy
 
 from .._common.arrays import FloatArray, filled
-from ..log import Log, Retimed
+from ..log import Log, Retimed, interpolated
 from .faults import SensorFault
 
 _SMOOTH_S = 0.2  # yaw acceleration is that of a parabola over this time
-_HALF_TAPS = 8  # of the interpolation, on either side
-_KAISER = 6.0  # its window's shape
 # What makes a channel late.
 LATE = {
     "vx_mps": ("delay_vx_s",),
@@ -128,27 +126,14 @@ def _accelerations(
 def shifted(time_s: FloatArray, values: FloatArray, delay_s: float) -> FloatArray:
     """Values that were written `delay_s` later; a hole stays one, beyond the ends is nothing.
 
-    Between two samples stands what a signal of their bandwidth has there: a straight line would
-    average the noise of the two, and noise that was white would be so no more.
+    Between two samples stands what a signal of their bandwidth has there (`interpolated`).
     """
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 2:
         return values
     shifted_to = time_s + delay_s
-    result: FloatArray = np.interp(shifted_to, time_s[known], values[known], np.nan, np.nan)
+    result = interpolated(time_s[known], values[known], shifted_to)
     every = int(np.median(np.diff(known)))
-    period = every * (time_s[-1] - time_s[0]) / (time_s.size - 1)
-    rows, part = divmod(delay_s / period, 1.0)
-    lags = np.arange(-_HALF_TAPS + 1, _HALF_TAPS + 1)
-    place = part - lags
-    inside = np.sqrt(np.maximum(1.0 - (place / (_HALF_TAPS + 0.5)) ** 2, 0.0))
-    taps = np.sinc(place) * np.i0(_KAISER * inside)
-    taps /= taps.sum()
-    from_rows = every * (int(rows) + lags)
-    at = known[(known + from_rows[0] >= 0) & (known + from_rows[-1] < values.size)]
-    sharp = values[at[:, None] + from_rows] @ taps
-    whole = np.isfinite(sharp)
-    result[at[whole]] = sharp[whole]
     nearest = np.clip(np.searchsorted(time_s, shifted_to - 1e-9), 0, time_s.size - 1)
     there = np.isfinite(values) if every > 1 else np.isfinite(values[nearest])
     kept: FloatArray = np.where(there, result, np.nan)

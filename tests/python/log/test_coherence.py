@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from smooth_log import drift
 
-from sysid_vehicle import Log, Model, drive, lab, manoeuvres, published, read_log
+from sysid_vehicle import Log, Model, RoadDisturbance, drive, lab, manoeuvres, published, read_log
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.log.laws.regression import find_lag, in_most, regress
 
@@ -176,6 +176,21 @@ class TestLags:
         for name in ("double_lane_change", "sine_sweep", "slalom", "step_steer"):
             log = drive(car, manoeuvres.all()[name], seed=11, rate_hz=50.0)
             assert heard(columns_of(log)) == "", name
+
+    @pytest.mark.parametrize("seed", [2093, 417566, 888012])
+    def test_gusts_while_braking_in_a_turn_are_no_late_steering(
+        self, truth: Model, seed: int
+    ) -> None:
+        """They push the axle and turn the car; least squares alone tell 0.07 to 0.17 s."""
+        gusts = RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
+        course = manoeuvres.brake_in_turn(lateral_mps2=5.0)
+        data = columns_of(drive(truth, course, seed=seed, disturbance=gusts, rate_hz=50.0))
+        assert heard(data) == ""
+        time_s = data["time_s"]
+        said = heard({**data, "steer_rad": np.interp(time_s - 0.12, time_s, data["steer_rad"])})
+        found = re.search(r"steer_rad: lags behind yaw_rate_radps and ay_mps2 by ([\d.]+) s", said)
+        assert found is not None, said
+        assert float(found[1]) == pytest.approx(0.12, abs=0.06)
 
     def test_at_one_frequency_a_lag_is_only_a_phase(self, truth: Model) -> None:
         data = columns_of(drive(truth, manoeuvres.slalom(), seed=12, rate_hz=50.0))

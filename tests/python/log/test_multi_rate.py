@@ -113,3 +113,69 @@ class TestHeld:
         np.testing.assert_array_equal(known[:-2], np.arange(0, 2 * known.size - 4, 2))
         # Of what is the same to the end of the record only the first is a reading.
         assert known.size > 495
+
+
+class TestSeveralClocks:
+    """Sensors of one rate whose rows lie a constant few ms apart."""
+
+    def rows(self, off_ms: int, rng: np.random.Generator, every_ms: int = 10) -> Columns:
+        ms = np.arange(60_001)
+        own = {"vx_mps": ms % every_ms == off_ms, "": ms % every_ms == 0}
+        there = own["vx_mps"] | own[""]
+        time_s = 0.001 * ms
+        values = columns(time_s)
+        values["vx_mps"] = 20.0 + np.sin(3.0 * time_s) + rng.normal(0.0, 0.03, ms.size)
+        for name in values:
+            if name != "time_s":
+                at = own["vx_mps" if name == "vx_mps" else ""]
+                values[name] = np.where(at, values[name], np.nan)
+        return {name: x[there] for name, x in values.items()}
+
+    @pytest.mark.parametrize("off_ms", [1, 3, 4, 6, 9])
+    def test_each_keeps_its_rate_its_times_and_its_noise(
+        self, off_ms: int, rng: np.random.Generator
+    ) -> None:
+        """Steps of 4 and 6 ms are no rounded ones of 5 ms; a line would halve the noise."""
+        with pytest.warns(SysidWarning, match=r"resampled at 100 Hz; trigger all sensors by one"):
+            log = make(self.rows(off_ms, rng))
+        assert log.rate_hz == pytest.approx(100.0, rel=1e-9)
+        noise = (log["vx_mps"] - 20.0 - np.sin(3.0 * log["time_s"]))[20:-20]
+        assert np.std(noise) == pytest.approx(0.03, rel=0.08)
+        assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.15
+        assert abs(np.mean(noise * np.cos(3.0 * log["time_s"][20:-20]))) < 0.0015  # 0.25 ms
+        np.testing.assert_allclose(log["steer_rad"], 0.05 * np.sin(log["time_s"]), atol=1e-9)
+
+    def test_stamps_that_jitter_and_drift(self, rng: np.random.Generator) -> None:
+        """Two devices, the second 3 ms later, 100 ppm slow, its stamps up to 2 ms off."""
+        even = 0.01 * np.arange(6000)
+        other = 1.0001 * even + 0.003 + rng.uniform(-0.002, 0.002, even.size)
+        time_s = np.union1d(even, other)
+        values = columns(time_s)
+        values["vx_mps"] = 20.0 + np.sin(3.0 * time_s) + rng.normal(0.0, 0.03, time_s.size)
+        for name in values:
+            if name != "time_s":
+                own = other if name == "vx_mps" else even
+                values[name] = np.where(np.isin(time_s, own), values[name], np.nan)
+        with pytest.warns(SysidWarning, match="resampled at 1"):
+            log = make(values)
+        noise = (log["vx_mps"] - 20.0 - np.sin(3.0 * log["time_s"]))[20:-20]
+        noise = noise[np.isfinite(noise)]
+        assert noise.size > 5900
+        assert np.std(noise) == pytest.approx(0.03, rel=0.08)
+        assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.15
+
+    def test_half_a_period_apart_is_a_log_of_twice_the_rate(self, rng: np.random.Generator) -> None:
+        """Each sample then stands at its own time, and nothing is interpolated but the inputs."""
+        given = self.rows(5, rng)
+        with pytest.warns(
+            SysidWarning, match=r"(steer_rad|ax_mps2): holds a value only every 0.01 s"
+        ):
+            log = make(given)
+        assert log.rate_hz == pytest.approx(200.0, rel=1e-9)
+        np.testing.assert_array_equal(log["vx_mps"], given["vx_mps"])
+
+    def test_times_in_whole_ms(self, rng: np.random.Generator) -> None:
+        """Of 200 Hz: steps of 2 and 3 ms would be rounded ones of 2.5 ms."""
+        with pytest.warns(SysidWarning, match=r"resampled at 200 Hz; trigger all sensors by one"):
+            log = make(self.rows(2, rng, every_ms=5))
+        assert log.rate_hz == pytest.approx(200.0, rel=1e-9)

@@ -141,3 +141,50 @@ def test_a_column_that_is_filled_with_one_number(log: sv.Log, channel: str, fill
 def test_a_car_that_stands(log: sv.Log) -> None:
     columns = {c: np.zeros(log.n) for c in log.channels} | {"time_s": log["time_s"]}
     assert set(sv.propose_channels(columns).channels) == set(log.channels)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        {"vx_mps": "SOG", "yaw_rate_radps": "imu_gz", "ax_mps2": "imu_ax", "ay_mps2": "imu_ay"},
+        {"vx_mps": "Speed", "yaw_rate_radps": "Yaw", "ax_mps2": "LongAcc", "ay_mps2": "LatAcc"},
+    ],
+)
+@pytest.mark.parametrize(
+    "units",
+    [
+        ("knots", "º/s", "m·s⁻²", 1852.0 / 3600.0),
+        ("kilometers per hour", "degrees/second", "meters/sec²", 1.0 / 3.6),
+        ("m s⁻¹", "degrees per second", "metres per second²", 1.0),
+    ],
+)
+def test_names_and_units_as_loggers_of_satellites_have_them(
+    tmp_path: Path, names: dict[str, str], units: tuple[str, str, str, float]
+) -> None:
+    time_s = 0.02 * np.arange(1500)
+    columns = {
+        "Time": ("s", time_s),
+        names["vx_mps"]: (units[0], (20.0 + np.sin(0.2 * time_s)) / units[3]),
+        names["yaw_rate_radps"]: (units[1], np.degrees(0.2 * np.sin(time_s))),
+        names["ax_mps2"]: (units[2], 0.2 * np.cos(0.2 * time_s)),
+        names["ay_mps2"]: (units[2], 4.0 * np.sin(time_s)),
+        "Steering": ("deg", np.degrees(0.03 * np.sin(time_s + 0.1))),
+    }
+    lines = [",".join(columns), ",".join(f"[{unit}]" for unit, _ in columns.values())]
+    lines += [
+        ",".join(f"{x:.9f}" for x in row)
+        for row in zip(*(v for _, v in columns.values()), strict=True)
+    ]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    found = sv.propose_channels(path).channels
+    assert {c: p.column for c, p in found.items() if c in names} == names
+    assert found["vx_mps"].factor == pytest.approx(units[3])
+    assert found["yaw_rate_radps"].factor == pytest.approx(np.pi / 180.0)
+    assert found["ay_mps2"].factor == 1.0
+
+
+def test_a_yaw_in_degrees_is_no_yaw_rate() -> None:
+    time_s = 0.02 * np.arange(1500)
+    columns = {"Time": time_s, "Speed [m/s]": np.full(1500, 20.0), "Yaw [deg]": time_s}
+    assert "yaw_rate_radps" in sv.propose_channels(columns).missing

@@ -41,6 +41,9 @@ def test_other_encodings_of_text(tmp_path: Path, encoding: str) -> None:
         (b"MATLAB 5.0 MAT-file, Platform", ["a MATLAB file, but it is broken", "record"]),
         (b"PK\x03\x04", ["ZIP", "Excel"]),
         (b"\x1f\x8b\x08", ["gzip", "gunzip"]),
+        (b'{"vx_mps": 20.1}\n{"vx_mps": 20.2}\n', ["is JSON", "read_json(path, lines=True)"]),
+        (b'{\n "vx_mps": [20.1,\n', ["is JSON", "pandas.read_json(path)"]),
+        (b'[{"vx_mps": 20.1}', ["is JSON", "pandas.read_json(path)"]),
         (b"\x01\x02\x00\xfe\x03", ["no text (first at byte 2)", "as CSV"]),
     ],
 )

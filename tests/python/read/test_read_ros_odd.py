@@ -114,11 +114,11 @@ def test_messages_of_other_encodings(tmp_path: Path) -> None:
     with (tmp_path / "run.mcap").open("wb") as file:
         writer = writers.Writer(file)
         writer.start()
-        for k, (encoding, by) in enumerate((("protobuf", "protobuf"), ("cdr", "ros2idl"))):
+        for k, (encoding, by) in enumerate((("cbor", ""), ("cdr", "ros2idl"))):
             schema = writer.register_schema(f"s{k}", by, b"")
             writer.add_message(writer.register_channel(f"/{k}", encoding, schema), 1, b"x", 1)
         writer.finish()
-    with pytest.raises(InvalidInput, match=r"only of encoding cdr by ros2idl, protobuf by protobu"):
+    with pytest.raises(InvalidInput, match=r"left out.*: /0 \(cbor\), /1 \(cdr by ros2idl\);"):
         read_log(tmp_path / "run.mcap", MAP, check=False)
 
 
@@ -128,6 +128,12 @@ def test_bags_without_their_description(tmp_path: Path) -> None:
     path.write_bytes(b"SQLite format 3\0" + bytes(200))
     with pytest.raises(InvalidInput, match=r"no metadata\.yaml beside it.*ros2 bag reindex"):
         read_log(path, MAP)
+    other = tmp_path / "fleet.sqlite"
+    other.write_bytes(path.read_bytes())
+    with pytest.raises(
+        InvalidInput, match=r"an SQLite data base, but no ROS bag.*pandas\.read_sql"
+    ):
+        read_log(other, MAP)
     with pytest.raises(InvalidInput, match=r"a folder without metadata\.yaml, so no ROS 2 bag"):
         read_log(tmp_path, MAP)
     bag = tmp_path / "run.bag"

@@ -11,7 +11,7 @@ from log_formats import FACTORS, FAST, MAP, SLOW, UNITS, check_values, measured
 from scipy.io import savemat
 
 from sysid_vehicle.errors import InvalidInput
-from sysid_vehicle.read import read_log
+from sysid_vehicle.read import propose_channels, read_log
 
 SI: dict[str, Any] = {c: {"column": n, "factor": FACTORS.get(c, 1.0)} for c, n in MAP.items()}
 START = datetime.datetime(2024, 3, 31, 0, 59, 58, tzinfo=datetime.UTC)
@@ -88,8 +88,9 @@ def at(t: float, offset_h: int) -> str:
         lambda t: f"5/31/2026 11:59:{58 + t} pm" if t < 2 else f"6/1/2026 12:00:{t - 2:06.3f} am",
         lambda t: f"59:{58 + t:06.3f}" if t < 2 else f"00:{t - 2:06.3f}",
         lambda t: at(t, 1 if t < 2 else 2),
+        lambda t: f"12:00:0{int(t + 1e-6)}:{round(1e3 * t) % 1000:03d}",
     ],
-    ids=["noon", "midnight", "minutes over the hour", "summer time begins"],
+    ids=["noon", "midnight", "minutes over the hour", "summer time begins", "colon before ms"],
 )  # fmt: skip
 def test_stamps(tmp_path: Path, stamp: Callable[[float], str]) -> None:
     log = read_log(csv(tmp_path, stamp), {**SI, "time_s": "Time"}, check=False)
@@ -102,6 +103,32 @@ def test_days_of_a_spreadsheet(tmp_path: Path) -> None:
         read_log(path, {**SI, "time_s": "Time"}, check=False)
     log = read_log(path, {**SI, "time_s": {"column": "Time", "factor": 86400}}, check=False)
     np.testing.assert_allclose(log["time_s"], FAST, atol=1e-4)
+
+
+def test_days_are_proposed(tmp_path: Path) -> None:
+    found = propose_channels(csv(tmp_path, lambda t: f"{45382.5 + t / 86400:.12f}"))
+    assert found.channels["time_s"].factor == 86400.0
+
+
+@pytest.mark.parametrize(("period_s", "name"), [(604800.0, "gps_sow"), (86400.0, "utc_seconds")])
+def test_seconds_of_the_week_and_of_the_day_begin_again(
+    tmp_path: Path, period_s: float, name: str
+) -> None:
+    path = csv(tmp_path, lambda t: f"{(period_s - 2.0 + t) % period_s:.3f}")
+    path.write_text(path.read_text().replace("Time", name))
+    log = read_log(path, {**SI, "time_s": name}, check=False)
+    np.testing.assert_allclose(log["time_s"] - log["time_s"][0], FAST, atol=1e-6)
+    pairs = {n: ((period_s - 2.0 + FAST) % period_s, v) for n, v in measured(FAST).items()}
+    check_values(read_log(pairs, SI, check=False), slow=())
+    with pytest.raises(InvalidInput, match="goes back"):
+        read_log({"time_s": (100.0 + FAST) % 102.0, **measured(FAST)}, SI, check=False)
+
+
+@pytest.mark.parametrize("name", ["gps_sow", "iTOW", "GPS TOW", "Seconds of Week"])
+def test_names_of_the_time_of_satellites(name: str) -> None:
+    data = {"gps_week": np.full(FAST.size, 2345.0), name: 3000.0 + FAST, **measured(FAST)}
+    data["Odometer"] = FAST
+    assert propose_channels(data).channels["time_s"].column == name
 
 
 def test_times_that_are_rounded(tmp_path: Path) -> None:
@@ -122,3 +149,36 @@ def test_times_of_32_bits_are_even(clock_s: float) -> None:
     assert log.rate_hz == pytest.approx(100.0, rel=2e-3)
     for channel, name in MAP.items():
         np.testing.assert_allclose(log[channel], SI[channel]["factor"] * columns[name])
+
+
+@pytest.mark.parametrize("delay_s", [0.0035, 0.015, -0.0123])
+def test_a_delay_in_the_map_leaves_white_noise_white(
+    delay_s: float, rng: np.random.Generator
+) -> None:
+    """A straight line between samples would look like a low-pass of the sensor."""
+    time_s = 0.01 * np.arange(6000)
+    noise = rng.normal(0.0, 0.03, time_s.size)
+    data = {
+        "time_s": time_s,
+        "vx_mps": np.full(time_s.size, 20.0),
+        "yaw_rate_radps": 0.1 * np.sin(time_s),
+        "ax_mps2": np.zeros(time_s.size),
+        "ay_mps2": 2.0 * np.sin(time_s - delay_s) + noise,
+        "steer_rad": 0.01 * np.sin(time_s),
+    }
+    log = read_log(data, {"ay_mps2": {"delay_s": delay_s}}, check=False)
+    left = (log["ay_mps2"] - 2.0 * np.sin(time_s))[20:-20]
+    assert np.std(left) == pytest.approx(0.03, rel=0.08)
+    assert abs(np.corrcoef(left[1:], left[:-1])[0, 1]) < 0.15
+
+
+def test_a_delayed_input_is_read_off_a_line() -> None:
+    """It may step, beside which a sharper interpolation would swing."""
+    time_s = 0.01 * np.arange(1000)
+    step = np.where(time_s < 5.0, 0.0, -3000.0)
+    data = {c: 20.0 + np.sin(time_s) for c in ("vx_mps", "yaw_rate_radps", "ay_mps2", "steer_rad")}
+    log = read_log(
+        {"time_s": time_s, **data, "fx_n": step}, {"fx_n": {"delay_s": 0.003}}, check=False
+    )
+    assert np.nanmin(log["fx_n"]) == -3000.0
+    assert np.nanmax(log["fx_n"]) == 0.0

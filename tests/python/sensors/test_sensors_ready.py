@@ -218,6 +218,26 @@ def test_a_shift_by_parts_of_a_sample_leaves_white_noise_white(delay_s: float) -
     np.testing.assert_allclose(wave, true, atol=3e-3)
 
 
+@pytest.mark.filterwarnings("ignore:.*trigger all sensors by one clock:sysid_vehicle.SysidWarning")
+@pytest.mark.parametrize("off_ms", [3, 4])
+def test_sensors_a_few_ms_apart_have_no_fault(off_ms: int) -> None:
+    """Read off straight lines, the noise of the speeds would be that of a low-pass."""
+    fine = sv.drive(
+        sv.Model(sv.example_vehicle()), sv.manoeuvres.lap(), seed=656905, rate_hz=1000.0
+    )
+    ms = np.arange(fine.n)
+    speeds, others = ms % 10 == off_ms, ms % 10 == 0
+    rows = {"time_s": fine["time_s"][speeds | others]}
+    for name in fine:
+        if name != "time_s":
+            own = speeds if name in ("vx_mps", "vy_mps") else others
+            rows[name] = np.where(own, fine[name], np.nan)[speeds | others]
+    found = sv.check(sv.read_log(rows))
+    assert found.found == ()
+    assert found.conditioning is not None
+    assert not found.conditioning.filters
+
+
 def test_where_no_fault_is_found_no_part_is_asked(
     log: sv.Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:

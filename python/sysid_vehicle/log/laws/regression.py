@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -17,6 +18,8 @@ _BLOCK = 6  # windows that are taken as dependent when deviations are estimated
 _STEP_S = 0.01
 _REACH_S = 0.28
 _COARSE_S = 0.04
+_SURE = 3.0  # deviations of what is sure
+_ROUNDS = 6  # of two-stage least squares, whose coefficients begin at those of the other
 _TINY = 1e-12
 
 Sides = Callable[[float], tuple[FloatArray, FloatArray]]
@@ -69,7 +72,7 @@ class Lag:
 
     def beyond(self, late_s: float, early_s: float) -> bool:
         """Whether the lag surely leaves ``-early_s .. late_s`` and lies inside what was tried."""
-        sure = abs(self.seconds) - 3.0 * self.deviation
+        sure = abs(self.seconds) - _SURE * self.deviation
         limit = late_s if self.seconds > 0.0 else early_s
         return sure > limit and abs(self.seconds) < _REACH_S - 0.5 * _COARSE_S
 
@@ -94,7 +97,13 @@ def regress(y: FloatArray, x: FloatArray, mean: FloatArray, spread: FloatArray) 
     return Regression(b, deviations, weights, scale, *_alone(y, x, weights))
 
 
-def find_lag(sides: Sides, mean: FloatArray, spread: FloatArray, usable: np.ndarray) -> Lag:
+def find_lag(
+    sides: Sides,
+    mean: FloatArray,
+    spread: FloatArray,
+    usable: np.ndarray,
+    instruments: FloatArray | None = None,
+) -> Lag:
     """Return the lag at which both sides fit best.
 
     Parameters
@@ -105,6 +114,11 @@ def find_lag(sides: Sides, mean: FloatArray, spread: FloatArray, usable: np.ndar
         As in :func:`regress`.
     usable : ndarray of bool, shape (n,)
         Rows to use.
+    instruments : ndarray, shape (n, k), optional
+        What moves the columns of ``X`` and is not moved by the residuals. Where columns answer to
+        what the equation leaves out the least misfit is at another lag than the true one; with
+        instruments that is tested (Hausman, *Econometrica* 46 (1978)), and if it is so, or if
+        they lose nothing, the lag is the one of two-stage least squares.
 
     Notes
     -----
@@ -138,10 +152,43 @@ def find_lag(sides: Sides, mean: FloatArray, spread: FloatArray, usable: np.ndar
         deviation = float(deviations[-1])
         lag = float(np.clip(lag + np.clip(step[-1], -_COARSE_S, _COARSE_S), -0.4, 0.4))
     best = max(_misfit(*rows(lag), mean, spread, start), _TINY)
+    if instruments is not None:
+        other = _two_stage(rows, lag, mean, spread, instruments[usable])
+        lost = math.sqrt(max(other[1] ** 2 - deviation**2, 0.0))
+        differ = abs(other[0] - lag) > _SURE * lost
+    else:
+        other, differ = (lag, deviation), False
     worse = _misfit(*rows(0.0), mean, spread, start)
     # The weights' sum stands for the number of rows that count.
     variance = best / max(float(start.weights.sum()), 1.0)
+    lag, deviation = other if differ else (lag, deviation)
     return Lag(lag, deviation, worse / best, (worse - best) / variance)
+
+
+def _two_stage(
+    rows: Sides, lag: float, mean: FloatArray, spread: FloatArray, instruments: FloatArray
+) -> tuple[float, float]:
+    """Lag and deviation by what of the columns follows the instruments, from another lag on."""
+    b, deviation = None, 0.0
+    for _ in range(_ROUNDS):
+        y, x = rows(lag)
+        (y1, x1), (y0, x0) = rows(lag + _STEP_S), rows(lag - _STEP_S)
+        now = regress(y, x, mean, spread)
+        b = now.coefficients if b is None else b
+        slope = ((y1 - x1 @ b) - (y0 - x0 @ b)) / (2.0 * _STEP_S)
+        step, deviations = _sandwich(
+            np.column_stack([x, -slope]),
+            y - x @ b,
+            np.append(spread, np.inf),
+            now.weights,
+            now.scale,
+            np.append(mean - b, 0.0),
+            instruments,
+        )
+        b = b + step[:-1]
+        deviation = float(deviations[-1])
+        lag = float(np.clip(lag + np.clip(step[-1], -_COARSE_S, _COARSE_S), -0.4, 0.4))
+    return lag, deviation
 
 
 def coarse_lags() -> FloatArray:
@@ -176,12 +223,18 @@ def _sandwich(
     weights: FloatArray,
     scale: float,
     offset: FloatArray | None = None,
+    instruments: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the step to the best coefficients, and their deviations from blocks of scores."""
     prior = _precision(spread)
-    matrix = x.T @ (x * weights[:, None]) / scale**2 + np.diag(prior)
+    root = np.sqrt(weights)[:, None]
+    rows = root * x
+    if instruments is not None:
+        first = root * instruments
+        rows = first @ np.linalg.lstsq(first, rows, rcond=None)[0]
+    matrix = rows.T @ rows / scale**2 + np.diag(prior)
     inverse = np.linalg.pinv(matrix, hermitian=True)
-    scores = x * (residual * weights)[:, None] / scale**2
+    scores = rows * root * residual[:, None] / scale**2
     right = scores.sum(axis=0) + (0.0 if offset is None else prior * offset)
     starts = np.arange(0, residual.size, _BLOCK)
     blocks = np.add.reduceat(scores, starts, axis=0)

@@ -23,6 +23,8 @@ _CURVE_SPREAD = np.array([30.0, 30.0, 30.0, 1000.0, 0.3, np.inf, 0.5])
 # speed, and of the steering angle's zero [rad].
 _ERROR_SPREAD = np.array([0.3, 0.1, 0.1, 0.02])
 
+_AGO_S = np.array([-0.3, -0.15, 0.0, 0.15, 0.3, 0.45, 0.6, 0.9])  # a late angle is ahead of itself
+
 _HIGHEST_HZ = 2.5
 _NARROW = 0.3  # spread of the frequencies over their mean; a slalom has 0.1, other driving 0.4
 
@@ -101,4 +103,22 @@ def steering_lag(m: Motion, usable: np.ndarray) -> Lag:
         return felt, np.column_stack(columns)
 
     mean = np.concatenate([_CURVE_PRIOR, np.zeros(4)])
-    return find_lag(sides, mean, np.concatenate([_CURVE_SPREAD, _ERROR_SPREAD]), usable)
+    spread = np.concatenate([_CURVE_SPREAD, _ERROR_SPREAD])
+    return find_lag(sides, mean, spread, usable, _steered(m, pull))
+
+
+def _steered(m: Motion, pull: FloatArray) -> FloatArray:
+    """What the driver does, over the time in which a car answers, shape (count, columns).
+
+    A gust or a bump pushes the axle and, a little later, turns the car, so that slip and force
+    have a part in common that no tyre made: with it, braking in a turn looks like late steering.
+    What follows the steering has no such part.
+    """
+    steer = m.channels["steer_rad"]
+    speed = m.channels["vx_mps"]
+    columns = [np.ones(m.count), m.mean(pull), m.mean(pull * np.tanh(steer / _KNEES_RAD[0]))]
+    for ago_s in _AGO_S:
+        then = m.shifted(steer, -ago_s)
+        bent = [m.mean(np.tanh(then / knee)) for knee in _KNEES_RAD[[0, 2]]]
+        columns += [*bent, m.mean(then * speed)]
+    return np.column_stack(columns)

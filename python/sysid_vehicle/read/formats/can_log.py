@@ -9,7 +9,7 @@ not available", is no measurement.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InvalidInput
-from ..recording import Entry, Recording, Signal
+from ..recording import Entry, LeftOut, Recording, Signal
 from .can_frames import Frame, frames_of
 from .named import without_named
 
@@ -46,9 +46,7 @@ def read(path: Path, dbc: Path | None) -> Recording:
     frames = Counter(_source(frame) for frame in frames_of(path, []))
     known = _known(messages, frames)
     if not known:
-        first = ", ".join(
-            f"0x{key & ~_BITS_OF_EXTENDED:X}" for (_, key), _ in frames.most_common(5)
-        )
+        first = ", ".join(hexadecimal(key) for (_, key), _ in frames.most_common(5))
         raise InvalidInput(
             f"{path}: none of its {len(frames)} kinds of frames ({first or 'there are none'}, ...) "
             f"is in {dbc.name}; give the database of this bus"
@@ -93,7 +91,38 @@ def read(path: Path, dbc: Path | None) -> Recording:
             name: wanted[places[name][0]][places[name][1]].signal(name, notes) for name in names
         }
 
-    return Recording(entries, fetch)
+    buses = len({bus for bus, _ in frames})
+    unknown = [source for source, _ in frames.most_common() if source not in known]
+    left = left_out_frames(
+        [hexadecimal(key) for _, key in unknown], dbc, [bus for bus, _ in unknown] * (buses > 1)
+    )
+    return Recording(entries, fetch, left_out=left)
+
+
+def left_out_frames(
+    identifiers: Sequence[str], dbc: Path, buses: Sequence[str] = ()
+) -> tuple[LeftOut, ...]:
+    """Return what is told of frames that a database lacks, by their identifiers.
+
+    Parameters
+    ----------
+    identifiers : sequence of str
+        In the order in which they are told.
+    dbc : Path
+    buses : sequence of str, optional
+        Of each identifier, where there are several.
+    """
+    kinds = buses or [""] * len(identifiers)
+    names: dict[str, str] = {}
+    for identifier, bus in zip(identifiers, kinds, strict=True):
+        names[identifier] = f"{names[identifier]}, {bus}" if identifier in names else bus
+    remedy = "if a channel is wanted of them, give the database that has it"
+    return (LeftOut("CAN identifier", names, f"not in {dbc.name}", remedy),) if names else ()
+
+
+def hexadecimal(key: int) -> str:
+    """Return an identifier as databases and buses show it."""
+    return f"0x{key & ~_BITS_OF_EXTENDED:X}"
 
 
 @dataclass
@@ -175,7 +204,7 @@ def _names(known: dict[Source, Any]) -> dict[Source, str]:
         same = [other for other, its in known.items() if its is message]
         parts = [source[0]] if len({bus for bus, _ in same}) > 1 else []
         if len({key for _, key in same}) > 1:
-            parts.append(f"0x{source[1] & ~_BITS_OF_EXTENDED:X}")
+            parts.append(hexadecimal(source[1]))
         names[source] = ".".join([*parts, message.name])
     return names
 

@@ -28,6 +28,7 @@ _LAST_ROWS = 20  # that tell how many cells a row has
 _FEWEST_CELLS = 3
 _LONGEST_PREAMBLE = 100
 _MOST_LINES_OF_TEXT = 5  # below the first one: sensors, descriptions, units, types
+_ANNOTATIONS = ("#datatype", "#group", "#default")  # of InfluxDB, which repeats names by design
 _UNITLESS = {"-", "--", "---"}  # a line of units may hold nothing else
 
 
@@ -57,6 +58,7 @@ def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
         As :func:`read_table`.
     """
     text = _blanks_as_tabs(text.replace("\r\n", "\n").replace("\r", "\n"))
+    annotated = text.startswith(_ANNOTATIONS)
     header, body, first_line = _split(text)
     delimiter = max(_DELIMITERS, key=header.count)
     _, cells = next(_rows(header, delimiter, 1), (1, []))
@@ -76,7 +78,7 @@ def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
     if delimiter != "," and "," in body:
         body = _with_points(body, delimiter, first_line)
     table = _read_fast(body, delimiter, names, units)
-    table = table or _read_slow(body, delimiter, names, units, first_line)
+    table = table or _read_slow(body, delimiter, names, units, first_line, annotated)
     notes = [
         f"the line '{delimiter.join(cells)[:60]}' above the numbers holds neither the names "
         f"of the columns nor their units, and was left out"
@@ -280,7 +282,12 @@ def _rows(text: str, delimiter: str, first_line: int) -> Iterator[tuple[int, lis
 
 
 def _read_slow(
-    body: str, delimiter: str, names: tuple[str, ...], units: dict[str, str], first_line: int
+    body: str,
+    delimiter: str,
+    names: tuple[str, ...],
+    units: dict[str, str],
+    first_line: int,
+    annotated: bool,
 ) -> Table:
     rows: list[list[str]] = []
     lines: list[int] = []
@@ -313,7 +320,7 @@ def _read_slow(
         raise InvalidInput(
             "there are only empty cells below the column names; record the log again"
         )
-    columns, not_numbers, seconds = {}, {}, {}
+    columns, not_numbers, seconds, texts = {}, {}, {}, {}
     for name, cells in zip(names, zip(*rows, strict=True), strict=True):
         try:
             values = _floats(cells)
@@ -323,14 +330,17 @@ def _read_slow(
             stamps = seconds_of_stamps(cells)
             if stamps is not None:
                 seconds[name] = stamps
+            else:
+                texts[name] = cells
         else:
             columns[name] = values
     notes += [
         f"line {line} repeats column names or units and was left out; read logs that were joined "
         f"one by one"
         for line in repeated[:1]
+        if not annotated
     ]
-    return Table(names, columns, not_numbers, len(rows), units, seconds, tuple(notes))
+    return Table(names, columns, not_numbers, len(rows), units, seconds, tuple(notes), texts)
 
 
 def _floats(cells: Sequence[str]) -> FloatArray:

@@ -1,4 +1,4 @@
-"""MCAP with messages of ROS 2 or JSON, by mcap and mcap-ros2-support.
+"""MCAP with messages of ROS 2, JSON or Protocol Buffers, by mcap and its decoders.
 
 A file that was not finished, as the recorder was switched off, has no index: what is whole of it is
 read from its beginning on.
@@ -8,46 +8,57 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from ...errors import InvalidInput
-from ..recording import Recording, Signal
+from ..recording import LeftOut, Recording, Signal
 from .messages import Taken, recording_of
+
+_PROTOBUF = "protobuf"
+_LONGEST = 80  # characters that are told of a message that a decoder refuses
 
 Held = tuple[Any, Any, Any]  # schema, channel, message
 
 
 def read(path: Path, dbc: Path | None) -> Recording:
     """List the numbers in the first message of each topic."""
-    import mcap_ros2.decoder
-
-    ros2 = mcap_ros2.decoder.DecoderFactory()
+    factories = _decoders()
     decoders: dict[int, Callable[[bytes], Any] | None] = {}
-    unread: set[str] = set()
+    unread: dict[str, str] = {}
 
     def decoder(schema: Any, channel: Any) -> Callable[[bytes], Any] | None:
         if channel.id not in decoders:
             encoding = channel.message_encoding
-            found = json.loads if encoding == "json" else ros2.decoder_for(encoding, schema)
+            found = json.loads if encoding == "json" else None
+            for factory in () if found else factories:
+                found = found or factory.decoder_for(encoding, schema)
             decoders[channel.id] = found
             if found is None:
-                unread.add(encoding if schema is None else f"{encoding} by {schema.encoding}")
+                unread[channel.topic] = _kind(encoding, schema)
         return decoders[channel.id]
 
     indexed = _topics(path)
     firsts: dict[str, Any] = {}
-    if indexed is None:
-        for schema, channel, message in _from_beginning(path, None)[0]:
-            if channel.topic not in firsts and (decode := decoder(schema, channel)) is not None:
+
+    def take(schema: Any, channel: Any, message: Any) -> None:
+        try:
+            if (decode := decoder(schema, channel)) is not None:
                 firsts[channel.topic] = decode(message.data)
+        except Exception as error:  # of whatever library: the other topics are read
+            unread[channel.topic] = f"{type(error).__name__}: {error}"[:_LONGEST]
+
+    if indexed is None:
+        for held in _from_beginning(path, None)[0]:
+            if held[1].topic not in firsts and held[1].topic not in unread:
+                take(*held)
     else:
         for topic in indexed:
-            for schema, channel, message in _by_index(path, [topic]):
-                if (decode := decoder(schema, channel)) is not None:
-                    firsts[topic] = decode(message.data)
-                break
+            for held in islice(_by_index(path, [topic]), 1):
+                take(*held)
 
     def messages(topics: list[str]) -> Iterator[Taken]:
         held = _by_index(path, topics) if indexed is not None else _from_beginning(path, topics)[0]
@@ -55,13 +66,10 @@ def read(path: Path, dbc: Path | None) -> Recording:
             if (decode := decoder(schema, channel)) is not None:
                 yield channel.topic, decode(message.data), message.log_time, channel.id
 
-    recording = recording_of(firsts.items(), messages)
-    if not recording.entries and unread:
-        raise InvalidInput(
-            f"{path}: holds no message that can be read, only of encoding "
-            f"{', '.join(sorted(unread))}; record ROS 2 or JSON messages, or decode them with "
-            f"their library and give read_log a dict of pairs of times and values"
-        )
+    left = _left_out(unread)
+    recording = recording_of(firsts.items(), messages, left)
+    if not recording.entries and left:
+        raise InvalidInput(f"{path}: holds no message that can be read; {left[0]}")
     if not recording.entries:
         raise InvalidInput(
             f"{path}: is an MCAP file, but holds no whole message with numbers; mend it with mcap "
@@ -78,6 +86,39 @@ def read(path: Path, dbc: Path | None) -> Recording:
         return dict(recording.fetch(names, notes))
 
     return replace(recording, fetch=fetch)
+
+
+def _decoders() -> list[Any]:
+    """Decoders of the libraries that are there; an older set-up lacks that of Protocol Buffers."""
+    import mcap_ros2.decoder
+
+    found: list[Any] = [mcap_ros2.decoder.DecoderFactory()]
+    with suppress(ImportError):
+        import mcap_protobuf.decoder
+
+        found.append(mcap_protobuf.decoder.DecoderFactory())
+    return found
+
+
+def _kind(encoding: str, schema: Any) -> str:
+    """What is told of the messages of a topic that nothing decodes."""
+    if schema is None or not schema.encoding or schema.encoding == encoding:
+        return encoding
+    return f"{encoding} by {schema.encoding}"
+
+
+def _left_out(unread: dict[str, str]) -> tuple[LeftOut, ...]:
+    if not unread:
+        return ()
+    remedy = (
+        "record ROS 2, JSON or protobuf messages, or decode them with their library and give "
+        "read_log a dict of pairs of times and values"
+    )
+    if set(unread.values()) == {_PROTOBUF}:
+        remedy = "pip install mcap-protobuf-support"
+    elif _PROTOBUF in unread.values():
+        remedy = f"for {_PROTOBUF} pip install mcap-protobuf-support, else {remedy}"
+    return (LeftOut("topic", unread, "as nothing here decodes the messages", remedy),)
 
 
 def _topics(path: Path) -> list[str] | None:

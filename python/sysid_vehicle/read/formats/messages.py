@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 
 from ...errors import InvalidInput
-from ..recording import Entry, Recording, Signal
+from ..recording import Entry, LeftOut, Recording, Signal
 
 _MOST_ELEMENTS = 64  # of an array that are listed one by one: more are an image or a scan
 _DEPTH = 8
 YAW = "quaternion_yaw"
 """What the yaw angle of a quaternion is called below it."""
 _HEADERS = ("header", "stamp")  # hold the time, no measurement
-_SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
+_SECONDS = ("sec", "secs", "seconds")
+_NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanos")
 _SAME_CLOCK_S = 1.0  # stamps that are farther from the recorder's time are of another clock
 
 Getter = Callable[[Any], Any]
@@ -28,8 +29,7 @@ Taken = tuple[str, Any, int, int]  # topic, message, time of the recorder [ns], 
 
 def numbers(message: Any, depth: int = _DEPTH) -> Iterator[tuple[str, Getter]]:
     """Yield path and getter of each number in a message, such as ``angular_velocity/z``."""
-    for name, get in _fields(message):
-        value = get(message)
+    for name, value, get in _fields(message):
         if isinstance(value, (bool, int, float, np.number, np.bool_)):
             yield name, get
         elif not isinstance(value, (str, bytes, type(None))) and depth > 0:
@@ -42,7 +42,7 @@ def numbers(message: Any, depth: int = _DEPTH) -> Iterator[tuple[str, Getter]]:
 
 def _yaw_of(message: Any) -> Getter | None:
     """The angle by which a quaternion turns about z, anticlockwise [rad]; None of anything else."""
-    parts = dict(_fields(message))
+    parts = {name: get for name, _, get in _fields(message)}
     if {*parts} != {"x", "y", "z", "w"}:
         return None
 
@@ -61,27 +61,59 @@ def _then(first: Getter, second: Getter) -> Getter:
     return lambda message: second(first(message))
 
 
-def _fields(message: Any) -> Iterator[tuple[str, Getter]]:
+def _fields(message: Any) -> Iterator[tuple[str, Any, Getter]]:
+    """Name, present value and getter of each field of a message or element of an array."""
+    found: list[tuple[str, Getter]]
     if isinstance(message, dict):
-        for key in message:
-            if key not in _HEADERS:
-                yield str(key), itemgetter(key)
-    elif isinstance(message, (list, tuple, np.ndarray)):
-        if len(message) <= _MOST_ELEMENTS:
-            for k in range(len(message)):
-                yield f"[{k}]", itemgetter(k)
+        found = [(str(key), itemgetter(key)) for key in message if key not in _HEADERS]
+    elif hasattr(message, "DESCRIPTOR"):
+        yield from _fields_of_protobuf(message)
+        return
+    elif isinstance(message, (list, tuple, np.ndarray)) or _is_repeated(message):
+        n = len(message)
+        found = [(f"[{k}]", itemgetter(k)) for k in range(n if n <= _MOST_ELEMENTS else 0)]
     else:
         fields = getattr(message, "__dataclass_fields__", None)
-        for name in fields if fields is not None else getattr(message, "__slots__", ()):
-            if not name.startswith("_") and name not in _HEADERS:
-                yield name, attrgetter(name)
+        names = fields if fields is not None else getattr(message, "__slots__", ())
+        found = [
+            (name, attrgetter(name))
+            for name in names
+            if not name.startswith("_") and name not in _HEADERS
+        ]
+    for name, get in found:
+        yield name, get(message), get
+
+
+def _is_repeated(message: Any) -> bool:
+    """Tell whether this is a repeated field of Protocol Buffers; a map is none."""
+    return hasattr(message, "MergeFrom") and not hasattr(message, "keys")
+
+
+def _fields_of_protobuf(message: Any) -> Iterator[tuple[str, Any, Getter]]:
+    """Fields by the schema: what the first message leaves unset may come in another.
+
+    What is unset reads as zero in the library of Protocol Buffers; here it is missing.
+    """
+    for told in message.DESCRIPTOR.fields:
+        name = told.name
+        if name in _HEADERS:
+            continue
+        value = getattr(message, name)
+        if not told.has_presence:
+            yield name, value, attrgetter(name)
+        elif message.HasField(name) or told.message_type is not message.DESCRIPTOR:
+            yield name, value, _if_set(name)
+
+
+def _if_set(name: str) -> Getter:
+    return lambda message: getattr(message, name) if message.HasField(name) else None
 
 
 def stamp_ns(message: Any) -> int:
     """Return the time at which a message was measured [ns]; 0 if it has none.
 
     It is the stamp of the header, or that of the message itself, or what Foxglove's schemas call
-    ``timestamp``: seconds and nanoseconds each.
+    ``timestamp``: seconds and nanoseconds each, as ROS or Protocol Buffers call them.
     """
     for stamp in (
         _part(_part(message, "header"), "stamp"),
@@ -121,13 +153,16 @@ class Topic:
         for path, get in self.getters.items():
             try:
                 value = float(get(message))
-            except (IndexError, KeyError, TypeError):  # an array may be shorter now
+            except (AttributeError, IndexError, KeyError, TypeError):
+                # An array may be shorter now, or a field unset.
                 value = np.nan
             self.values.setdefault(path, []).append(value)
 
 
 def recording_of(
-    firsts: Iterable[tuple[str, Any]], messages: Callable[[list[str]], Iterator[Taken]]
+    firsts: Iterable[tuple[str, Any]],
+    messages: Callable[[list[str]], Iterator[Taken]],
+    left_out: tuple[LeftOut, ...] = (),
 ) -> Recording:
     """Return the numbers in the first message of each topic as channels.
 
@@ -137,6 +172,8 @@ def recording_of(
         Topic and first message.
     messages : callable
         Yields all messages of some topics, with the times at which they were recorded.
+    left_out : tuple of LeftOut
+        Topics that nothing decodes.
     """
     places = {
         f"{topic}/{path}": (topic, path, get)
@@ -157,7 +194,7 @@ def recording_of(
         name: Entry("rad" if path.endswith(f"/{YAW}") else "", topic)
         for name, (topic, path, _) in places.items()
     }
-    return Recording(entries, fetch)
+    return Recording(entries, fetch, left_out=left_out)
 
 
 def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]:

@@ -6,35 +6,49 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from ..._common.files import read_bytes
 from ...errors import InvalidInput
-from ..recording import Recording
+from ..recording import LeftOut, Recording
 from .messages import Taken, recording_of
 
 
 def read(path: Path, dbc: Path | None) -> Recording:
     """List the numbers in the first message of each topic whose type is known."""
+    if path.is_file() and path.suffix != ".db3" and read_bytes(path, 6) == b"SQLite":
+        raise InvalidInput(
+            f"{path}: is an SQLite data base, but no ROS bag, whose files are called .db3; give "
+            f"read_log the table that pandas reads from it: pandas.read_sql('SELECT * FROM ...', "
+            f"sqlite3.connect(path))"
+        )
     if path.suffix == ".db3" and not (path.parent / "metadata.yaml").exists():
         raise InvalidInput(
             f"{path}: has no metadata.yaml beside it, which tells its topics; make it with "
             f"ros2 bag reindex {path.parent}"
         )
     firsts: list[tuple[str, Any]] = []
+    unread: dict[str, str] = {}
     with _opened(path) as reader:
         for connection in reader.connections:
             if connection.msgtype in reader.typestore.types:
                 first = next(_messages(reader, [connection]), None)
                 firsts += [] if first is None else [first[:2]]
+            elif connection.msgcount:
+                unread[connection.topic] = connection.msgtype
 
     def messages(topics: list[str]) -> Iterator[Taken]:
         with _opened(path) as reader:
             yield from _messages(reader, [c for c in reader.connections if c.topic in topics])
 
-    recording = recording_of(firsts, messages)
+    remedy = (
+        "record with the definitions of the messages (ros2 bag record -s mcap), or turn the bag "
+        "into MCAP where these are installed (ros2 bag convert)"
+    )
+    why = "as the bag does not define the messages and they are not of ROS itself"
+    left = (LeftOut("topic", unread, why, remedy),) if unread else ()
+    recording = recording_of(firsts, messages, left)
     if not recording.entries:
-        raise InvalidInput(
-            f"{path}: holds no message of a known type; record it with the definitions of its "
-            f"messages (MCAP does)"
-        )
+        told = f"; {left[0]}" if left else f"; {remedy}"
+        raise InvalidInput(f"{path}: holds no message of a known type{told}")
     return recording
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 
 from ..._common.files import read_bytes
@@ -28,6 +29,8 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b"<html", "a web page", "download the file itself"),
     (b"version https://git-lfs", "a pointer of Git LFS", "fetch the file with git lfs pull"),
 )
+# Objects, or rows of them; in one line or in one for each row.
+_JSON = re.compile(rb'\A(\xef\xbb\xbf)?\s*(\{\s*"|\[\s*[\[{])')
 _UTF_32 = ((codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"))
 _UTF_16 = ((codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 
@@ -44,6 +47,13 @@ def read_text_table(path: str | Path) -> str:
     for signature, what, remedy in _SIGNATURES:
         if raw.startswith(signature):
             raise InvalidInput(f"{path}: is {what}, not CSV; {remedy}")
+    if _JSON.match(raw):
+        first, _, rest = raw.strip().partition(b"\n")
+        lines = rest and first.rstrip().endswith(b"}")
+        raise InvalidInput(
+            f"{path}: is JSON, not CSV; give read_log the table that pandas makes of it: "
+            f"pandas.read_json(path{', lines=True' if lines else ''})"
+        )
     for mark, encoding in (*_UTF_32, *_UTF_16):
         if raw.startswith(mark):
             return _decoded(raw, encoding, path)

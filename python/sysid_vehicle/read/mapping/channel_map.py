@@ -179,7 +179,7 @@ class ChannelMap:
             result["time_s"] = factor * values_of(table, "time_s", "time_s")
         for channel, source in self.sources.items():
             if "time_s" in result:
-                result[channel] = source.on_time(result["time_s"], result[channel])
+                result[channel] = source.on_time(result["time_s"], result[channel], channel)
         over_ground = {} if self.ground is None else self.ground.read(table, result, notes)
         skipped = {*result, *self.absent, *(_OVER_GROUND if over_ground else ())}
         used = {column for source in self.sources.values() for column in source.columns}

@@ -98,7 +98,7 @@ class Ground:
             if PARTS[part] == "rad":
                 values = from_east(values, self.counted_from.get(part, "north"))
             found[part] = (
-                source.on_time(columns["time_s"], values) if "time_s" in columns else values
+                source.on_time(columns["time_s"], values, part) if "time_s" in columns else values
             )
         return found
 

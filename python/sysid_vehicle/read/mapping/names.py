@@ -23,6 +23,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"^(t|ts|zeit|(time ?)?stamps?( s| sec\w*)?|times?|tout|utc time)$",
         r"^(temps|tempo|tiempo|tijd|tid|時間|時刻|时间)$",
         r"\btime\b|^(header )?stamp\b|^(sec(ond)?s|elapsed|epoch)\b",
+        r"\bi? ?tow\b|\bsow\b|\bseconds? of (the )?(week|day)\b",
     ),
     "vx_mps": (
         r"^[uv] ?x( mps)?$",
@@ -31,7 +32,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"(speed|vel\w*) forward$|\bvel\w* hor x$|^wheel based vehicle speed",
         r"^(speed|velocity|vel|geschwindigkeit|v)$",
         r"\b(speed|velocity|geschwindigkeit)\b",
-        r"^(vitesse|velocita|velocidade?|snelheid|hastighet)\b|車速|车速",
+        r"^(vitesse|velocita|velocidade?|snelheid|hastighet)\b|車速|车速|\bsog\b",
     ),
     "vy_mps": (
         r"^[uv] ?y( mps)?$",
@@ -44,6 +45,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"angular velocity z$|gyro\w* (z|yaw)|twist angular z$|psi ?(p|dot|rate)$",
         r"^(w|omega|rate|gyro|ang vel) ?z$|\bgyro z\b|\byaw\b.*\b(dps|radps|degps)\b",
         r"\b(ang\w*|rotation) rate (z|down)$|\brate (body|hor) z$|\bheading rate$|^r$|^d ?psi$",
+        r"^(imu|ins|body) (g|w|omega|gyr|rate) ?z$|^gyr ?z$",
         r"\b(lacet|imbardata|guinada)\b|^gier|girhastighet|ヨーレート|横摆角速度",
     ),
     "ax_mps2": (
@@ -51,12 +53,14 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"long\w* (acc\w*|g\b)|acc\w* (x|long\w*)|g (force )?(long|x)\w*",
         r"inline acc\w*|laengsbeschl\w*|langsversnelling",
         r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
+        r"^(imu|ins|body) a ?x$",
         r"\bacc (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
     ),
     "ay_mps2": (
         r"^a ?y( cg)?( mps2)?$|acc ?y$|y acc\w*$",
         r"lat\w* (acc\w*|g\b)|acc\w* (y|lat\w*)|g (force )?(lat|y)\w*|querbeschl\w*",
         r"^ace?l\w* (lat|trans)\w*|^acc?el\w* trans\w*|dwarsversnelling",
+        r"^(imu|ins|body) a ?y$",
         r"\bacc (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
     ),
     "steer_rad": (
@@ -97,6 +101,8 @@ _REFUSED: dict[str, str] = {
         r"\b(std\w*|accuracy|cov\w*|error|sigma|rate|acc\w*|target|ref\w*|wind|valid|status)\b",
     ),
 }
+# Names that are those of a channel in its unit alone: a yaw in deg is an angle.
+_IN_ITS_UNIT = {"yaw_rate_radps": r"^(yaw|gyro|psi)$"}
 _SI = {
     "time_s": "s",
     "vx_mps": "m/s",
@@ -161,9 +167,11 @@ def rank(name: str, unit: str, channel: str) -> float:
         ),
         default=0.0,
     )
+    fits = plain(unit) in FACTORS[si_unit(channel, name)]
+    if score == 0.0 and fits and channel in _IN_ITS_UNIT:
+        score = float(re.search(_IN_ITS_UNIT[channel], forms[2]) is not None)
     if score == 0.0 or not unit or states_nothing(unit):
         return score
-    fits = plain(unit) in FACTORS[si_unit(channel, name)]
     known = any(plain(unit) in factors for factors in FACTORS.values())
     return score + 2.0 if fits else 0.0 if known else score
 

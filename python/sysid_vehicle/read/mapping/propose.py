@@ -10,9 +10,10 @@ import numpy as np
 from ..._common.arrays import FloatArray
 from ..._common.files import as_path
 from ..._common.typed import typed
-from ...errors import InvalidInput
+from ...errors import InvalidInput, warn
 from ...log import CHANNELS, Columns, Log, standing
 from ...vehicle import Vehicle
+from ..recording import Recording
 from ..registry import blamed, recognised
 from ..units import factor_to
 from .ground import PARTS
@@ -34,6 +35,8 @@ from .source import signed
 _DESPIKED = ("steer_rad", "ax_mps2", "ay_mps2")  # of states a log leaves dropouts out by itself
 _TURNED = ("yaw_rate_radps", "ay_mps2", "steer_rad")  # together, where the axes have z down
 _FINER = ((0.5, 1.0), (500.0, 1e-3), (5e5, 1e-6), (np.inf, 1e-9))  # steps below, factor of time
+_DAYS_BELOW = 1e-5  # steps that are days
+_DATES = (30000.0, 60000.0)  # days since 1900: from 1982 to 2064
 
 
 @typed
@@ -63,6 +66,11 @@ def propose_channels(
     ------
     InvalidInput
         If the log cannot be read.
+
+    Warns
+    -----
+    SysidWarning
+        Of what the file holds and nothing here reads.
     """
     from .. import contents
 
@@ -77,6 +85,8 @@ def propose_channels(
             if not is_path or as_path(source).name in str(error):
                 raise
             raise InvalidInput(f"{source}: {error}") from error
+        for left in held.left_out if isinstance(held, Recording) else ():
+            warn(f"{as_path(source).stem if is_path else 'log'}: {left}")
         view = View(held)
         chosen = {
             channel: found
@@ -97,8 +107,15 @@ def propose_channels(
 
 def _in_seconds(time: FloatArray) -> FloatArray:
     """Return times in the unit that their steps ask for, which no name or unit is asked for."""
+    return time * _factor(time)
+
+
+def _factor(time: FloatArray) -> float:
+    """The factor that makes seconds of times, by their steps; days as spreadsheets count them."""
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    return time * next(factor for below, factor in _FINER if step < below)
+    if 0.0 < step < _DAYS_BELOW and _DATES[0] < float(time[0]) < _DATES[1]:
+        return 86400.0
+    return next(factor for below, factor in _FINER if step < below)
 
 
 class _Guess:
@@ -246,7 +263,7 @@ class _Guess:
         if known and known * step < longest:
             self.factors["time_s"] = known
         else:
-            self.factors["time_s"] = next(f for below, f in _FINER if step < below)
+            self.factors["time_s"] = _factor(clock)
             self._note("time_s", f"steps of {step:.4g}" if held else "")
 
     def _by_motion(

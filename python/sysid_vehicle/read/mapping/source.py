@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +12,13 @@ import numpy as np
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.files import refuse_unknown
 from ...errors import InvalidInput, near_names
-from ...log import CHANNELS, listed
+from ...log import CHANNELS, MEASURED, held_rows, interpolated, listed
 from ..table import Table
 from ..units import WHAT, factor_to, measures, states_nothing
 
 _SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s", "sideslip", "sign", "mean_with")
+_GROUND = ("east", "north", "speed", "course", "heading")  # speeds and angles are measured too
+Between = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -83,9 +85,16 @@ class Source:
         with np.errstate(over="ignore", invalid="ignore"):  # what is endless is refused later
             return as_float64(self.factor * values + self.offset)
 
-    def on_time(self, time_s: FloatArray, values: FloatArray) -> FloatArray:
-        """Return values that were read, earlier by `delay_s`; beyond the ends none is known."""
-        return _earlier(time_s, values, self.delay_s) if self.delay_s else values
+    def on_time(self, time_s: FloatArray, values: FloatArray, channel: str) -> FloatArray:
+        """Return values that were read, earlier by `delay_s`; beyond the ends none is known.
+
+        What is measured keeps its noise as it is. An input may step, which only a straight line
+        between samples follows; so may a channel whose values a logger repeats.
+        """
+        if not self.delay_s:
+            return values
+        sharp = (channel in (*MEASURED, *_GROUND)) and not held_rows(values)
+        return _earlier(time_s, values, self.delay_s, interpolated if sharp else _line)
 
 
 def signed(values: FloatArray, sign: FloatArray) -> FloatArray:
@@ -105,12 +114,18 @@ def values_of(table: Table, column: str, channel: str) -> FloatArray:
     return table.column(column)
 
 
-def _earlier(time_s: FloatArray, values: FloatArray, delay_s: float) -> FloatArray:
+def _line(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
+    return as_float64(np.interp(at_s, time_s, values, np.nan, np.nan))
+
+
+def _earlier(
+    time_s: FloatArray, values: FloatArray, delay_s: float, between: Between
+) -> FloatArray:
     """Return the values that were written `delay_s` later; beyond the ends nothing is known."""
     known = np.isfinite(values) & np.isfinite(time_s)
     if np.count_nonzero(known) < 2 or not (np.diff(time_s) > 0.0).all():
         return values  # the log is refused for it
-    shifted = np.interp(time_s + delay_s, time_s[known], values[known], np.nan, np.nan)
+    shifted = between(time_s[known], values[known], time_s + delay_s)
     # A hole stays one, and a slow channel keeps as many samples as it has.
     nearest = np.clip(np.searchsorted(time_s, time_s + delay_s - 1e-9), 0, time_s.size - 1)
     result: FloatArray = np.where(known[nearest], shifted, np.nan)
