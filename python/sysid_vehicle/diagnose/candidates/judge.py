@@ -177,7 +177,7 @@ class _Beside:
             return replace(verdict, finding="proxy", group=self.names)
         # Beside its rival it explains nothing: its size is that of the model without it.
         value, std = self.refitted.get(effect.id, ((), ()))
-        bound = bound_of(effect, value, std, self.rules)
+        bound = bound_of(effect, value, std, self.rules) if value else ()
         finding: Finding = "one of a group"
         return EffectVerdict(effect, finding, value, std, bound, instead)
 
