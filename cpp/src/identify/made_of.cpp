@@ -26,7 +26,7 @@ class Digest {
     static std::uint64_t mixed(std::uint64_t x) {
         constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15;  // 2^64 over the golden ratio, odd
         x *= kGolden;
-        return x ^ (x >> 32);
+        return x ^ (x >> 32U);
     }
 
     std::array<std::uint64_t, 4> chains_{1, 2, 3, 4};

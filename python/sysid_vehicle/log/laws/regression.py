@@ -136,21 +136,8 @@ def find_lag(
     lag = float(lags[int(np.argmin(profile))])
     deviation = 0.0
     for _ in range(2):
-        y, x = rows(lag)
-        (y1, x1), (y0, x0) = rows(lag + _STEP_S), rows(lag - _STEP_S)
-        now = regress(y, x, mean, spread)
-        b = now.coefficients
-        slope = ((y1 - x1 @ b) - (y0 - x0 @ b)) / (2.0 * _STEP_S)
-        step, deviations = _sandwich(
-            np.column_stack([x, -slope]),
-            y - x @ b,
-            np.append(spread, np.inf),
-            now.weights,
-            now.scale,
-            np.append(mean - b, 0.0),
-        )
-        deviation = float(deviations[-1])
-        lag = float(np.clip(lag + np.clip(step[-1], -_COARSE_S, _COARSE_S), -0.4, 0.4))
+        _, step, deviation = _stepped(rows, lag, mean, spread)
+        lag = _moved(lag, step)
     best = max(_misfit(*rows(lag), mean, spread, start), _TINY)
     if instruments is not None:
         other = _two_stage(rows, lag, mean, spread, instruments[usable])
@@ -171,24 +158,42 @@ def _two_stage(
     """Lag and deviation by what of the columns follows the instruments, from another lag on."""
     b, deviation = None, 0.0
     for _ in range(_ROUNDS):
-        y, x = rows(lag)
-        (y1, x1), (y0, x0) = rows(lag + _STEP_S), rows(lag - _STEP_S)
-        now = regress(y, x, mean, spread)
-        b = now.coefficients if b is None else b
-        slope = ((y1 - x1 @ b) - (y0 - x0 @ b)) / (2.0 * _STEP_S)
-        step, deviations = _sandwich(
-            np.column_stack([x, -slope]),
-            y - x @ b,
-            np.append(spread, np.inf),
-            now.weights,
-            now.scale,
-            np.append(mean - b, 0.0),
-            instruments,
-        )
-        b = b + step[:-1]
-        deviation = float(deviations[-1])
-        lag = float(np.clip(lag + np.clip(step[-1], -_COARSE_S, _COARSE_S), -0.4, 0.4))
+        b, step, deviation = _stepped(rows, lag, mean, spread, b, instruments)
+        b, lag = b + step[:-1], _moved(lag, step)
     return lag, deviation
+
+
+def _stepped(
+    rows: Sides,
+    lag: float,
+    mean: FloatArray,
+    spread: FloatArray,
+    b: FloatArray | None = None,
+    instruments: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray, float]:
+    """Coefficients, those of a regression if none are given; a step of them and the lag beside it.
+
+    Last comes the deviation of the lag.
+    """
+    y, x = rows(lag)
+    (y1, x1), (y0, x0) = rows(lag + _STEP_S), rows(lag - _STEP_S)
+    now = regress(y, x, mean, spread)
+    b = now.coefficients if b is None else b
+    slope = ((y1 - x1 @ b) - (y0 - x0 @ b)) / (2.0 * _STEP_S)
+    step, deviations = _sandwich(
+        np.column_stack([x, -slope]),
+        y - x @ b,
+        np.append(spread, np.inf),
+        now.weights,
+        now.scale,
+        np.append(mean - b, 0.0),
+        instruments,
+    )
+    return b, step, float(deviations[-1])
+
+
+def _moved(lag: float, step: FloatArray) -> float:
+    return float(np.clip(lag + np.clip(step[-1], -_COARSE_S, _COARSE_S), -0.4, 0.4))
 
 
 def coarse_lags() -> FloatArray:
