@@ -34,6 +34,18 @@ def measured(time_s: np.ndarray) -> Columns:
     }
 
 
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: ECU
+BO_ 256 Motion: 8 ECU
+ SG_ YawRate : 0|16@1- (0.001,0) [-32|32] "deg/s" ECU
+ SG_ LongAcc : 16|16@1- (0.0001,0) [-3|3] "g" ECU
+ SG_ LatAcc : 32|16@1- (0.0001,0) [-3|3] "g" ECU
+ SG_ Steer : 48|16@1- (0.00001,0) [-0.3|0.3] "rad" ECU
+"""
+"""A database of CAN frames with all but the speed."""
+
 UNITS = {"YawRate": "deg/s", "LongAcc": "g", "LatAcc": "g", "Steer": "rad", "Speed": "km/h"}
 FACTORS = {"vx_mps": 1 / 3.6, "yaw_rate_radps": np.pi / 180, "ax_mps2": 9.80665, "ay_mps2": 9.80665}
 

@@ -36,13 +36,7 @@ class Gains {
     void use(std::size_t run, std::size_t k, const Errors& error, FrozenPath& path,
              State&& state) const {
         const std::size_t at = first_[run] + k;
-        double* white = path.whitened.data() + at * kChannels;
-        const double* whitener = filter_.whitener(run, k);
-        for (std::size_t i = 0; i < kChannels; ++i) {
-            double sum = 0.0;
-            for (std::size_t j = 0; j <= i; ++j) sum += *whitener++ * error[j];
-            white[i] = sum;
-        }
+        filter_.whiten(run, k, error.data(), path.whitened.data() + at * kChannels);
         const double* gains = filter_.gain(run, k);
         for (std::size_t i = 0; i < places_.size(); ++i) {
             double& x = state(i);
@@ -240,17 +234,12 @@ class PathWalk {
 /// The path of the parameters that the filter has run with.
 void as_told(const Problem& problem, const FrozenFilter& filter, FrozenPath& path) {
     const std::size_t n = filter.rows.size();
-    double *white = path.whitened.data(), *predicted = path.predicted.data(),
-           *corrected = path.corrected.data();
+    double *predicted = path.predicted.data(), *corrected = path.corrected.data();
     for (std::size_t i = 0, at = 0; i < problem.runs.size(); ++i)
         for (std::size_t k = 0; k < problem.runs[i].size(); ++k, ++at) {
             poll_interrupt(k);
             const double *error = filter.told(i, k), *mean = error + kChannels;
-            const double* whitener = filter.whitener(i, k);
-            for (std::size_t c = 0; c < kChannels; ++c, ++white) {
-                *white = 0.0;
-                for (std::size_t j = 0; j <= c; ++j) *white += *whitener++ * error[j];
-            }
+            filter.whiten(i, k, error, path.whitened.data() + at * kChannels);
             if (path.states == 0) continue;
             path.parts[at] = filter.runs[i].substeps[k];
             std::copy_n(mean, n, corrected + at * path.states);

@@ -64,7 +64,8 @@ void add_told(const FrozenFilter& filter, std::size_t run, std::size_t k, Trace&
     const double* from = filter.whitener(run, k);
     for (int i = 0; i < kChannels; ++i)
         for (int j = 0; j <= i; ++j) whitener(i, j) = *from++;
-    const Vec<kChannels> white = whitener * Eigen::Map<const Vec<kChannels>>(error);
+    Vec<kChannels> white;
+    filter.whiten(run, k, error, white.data());
     std::array<bool, kChannels> missing{};
     for (int i = 0; i < kChannels; ++i) {
         missing[static_cast<std::size_t>(i)] = whitener(i, i) == 0.0;

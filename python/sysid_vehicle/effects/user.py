@@ -8,6 +8,7 @@ import runpy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from .._common.arguments import expect
 from .._common.typed import typed
 from ..errors import InvalidInput
 from . import plugins
@@ -230,6 +231,9 @@ def define_effect(
         if function is not None
     }
     what = f"effect '{id}'"
+    texts = {"title": title, "equation": equation, "source": source, "excited_by": excited_by}
+    for told, text in texts.items():
+        expect(text, str, f"{what}: {told}")
     known = {e.breaks for e in catalogue()}
     if breaks not in known:
         raise InvalidInput(

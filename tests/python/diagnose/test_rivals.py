@@ -75,10 +75,8 @@ def test_a_rival_by_its_score_is_refitted_or_none(twice: Fit) -> None:
     with Workers(2) as pool:
         these = Refitting(twice, twice.driving, USUAL, (), pool, np.inf, False)
         best = finished(twice, refitted(twice, twice.driving, lag))
-        left, board = (
-            omnibus(twice, twice.driving),
-            score_board(twice, twice.driving, twice.model.candidates),
-        )
+        left = omnibus(twice, twice.driving)
+        board = score_board(twice, twice.driving, twice.model.candidates)
         found = these.beside_the_leading(scored, [best], (), 2, left, board)
         assert all(c.finished and c.fit is not None for c in found)
         few, hidden = found[:2], found[2:]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from log_formats import FAST, SLOW, UNITS, check_values, measured, read_told
+from log_formats import DBC, FAST, SLOW, UNITS, check_values, measured, read_told
 
 from sysid_vehicle import example_vehicle
 from sysid_vehicle.cli import main
@@ -185,16 +185,7 @@ def test_types_that_a_bag_does_not_define(tmp_path: Path) -> None:
         propose_channels(path)
 
 
-DBC = """VERSION ""
-NS_ :
-BS_:
-BU_: ECU
-BO_ 256 Motion: 8 ECU
- SG_ YawRate : 0|16@1- (0.001,0) [-32|32] "deg/s" ECU
- SG_ LongAcc : 16|16@1- (0.0001,0) [-3|3] "g" ECU
- SG_ LatAcc : 32|16@1- (0.0001,0) [-3|3] "g" ECU
- SG_ Steer : 48|16@1- (0.00001,0) [-0.3|0.3] "rad" ECU
-BO_ 512 Wheels: 2 ECU
+OWN_DBC = f"""{DBC}BO_ 512 Wheels: 2 ECU
  SG_ Speed : 0|16@1+ (0.01,0) [0|300] "km/h" ECU
 """
 
@@ -202,7 +193,7 @@ BO_ 512 Wheels: 2 ECU
 def write_frames(folder: Path, suffix: str, without: tuple[str, ...] = ()) -> tuple[Path, Path]:
     can, cantools = pytest.importorskip("can"), pytest.importorskip("cantools")
     dbc, path = folder / "car.dbc", folder / f"run.{suffix}"
-    dbc.write_text(DBC)
+    dbc.write_text(OWN_DBC)
     database = cantools.database.load_file(dbc)
     sent: list[tuple[float, int, bytes]] = [(t, 0x7A1, b"\x01") for t in FAST]
     sent += [(t, 0x18FEF100, b"\x01") for t in SLOW]

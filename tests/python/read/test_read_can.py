@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from log_formats import FAST, MAP, SLOW, check_values, measured, read_told
+from log_formats import DBC, FAST, MAP, SLOW, check_values, measured, read_told
 
 from sysid_vehicle import example_vehicle
 from sysid_vehicle.cli import main
@@ -18,16 +18,7 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore::ResourceWarning",
 )
 
-DBC = """VERSION ""
-NS_ :
-BS_:
-BU_: ECU
-BO_ 256 Motion: 8 ECU
- SG_ YawRate : 0|16@1- (0.001,0) [-32|32] "deg/s" ECU
- SG_ LongAcc : 16|16@1- (0.0001,0) [-3|3] "g" ECU
- SG_ LatAcc : 32|16@1- (0.0001,0) [-3|3] "g" ECU
- SG_ Steer : 48|16@1- (0.00001,0) [-0.3|0.3] "rad" ECU
-BO_ 2566914048 Wheels: 2 ECU
+OWN_DBC = f"""{DBC}BO_ 2566914048 Wheels: 2 ECU
  SG_ Speed : 0|16@1+ (0.01,0) [0|300] "km/h" ECU
 BO_ 768 Never: 1 ECU
  SG_ Nothing : 0|8@1+ (1,0) [0|1] "" ECU
@@ -38,7 +29,7 @@ class TestCan:
     def write(self, folder: Path, suffix: str) -> tuple[Path, Path]:
         can, cantools = pytest.importorskip("can"), pytest.importorskip("cantools")
         dbc, path = folder / "car.dbc", folder / f"run.{suffix}"
-        dbc.write_text(DBC)
+        dbc.write_text(OWN_DBC)
         database = cantools.database.load_file(dbc)
         frames = []
         for name, times in (("Motion", FAST), ("Wheels", SLOW)):
@@ -77,7 +68,7 @@ class TestCan:
             read_log(path, MAP)
         other = tmp_path / "other.dbc"
         other.write_text(
-            DBC.replace("256 Motion", "257 Motion").replace("2566914048", "2566914049")
+            OWN_DBC.replace("256 Motion", "257 Motion").replace("2566914048", "2566914049")
         )
         with pytest.raises(InvalidInput, match=r"none of its 2 kinds of frames \(0x100, "):
             read_log(path, MAP, dbc=other)

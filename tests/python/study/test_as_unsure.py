@@ -27,6 +27,7 @@ def test_sizes_of_effects_are_as_unsure_wherever_they_stand(
             EffectVerdict(rival, "one of a group", (0.1, 0.1), (0.01, 0.02), group=("mass",)),
             EffectVerdict(effect("wheel_inertia"), "one of a group", group=("mass",)),
             EffectVerdict(effect("gyro_bias"), "absent", (0.1,), (0.01,), (0.2,)),
+            EffectVerdict(effect("aero_drag"), "proxy", (0.1,), (0.01,), (0.2,), ("mass",)),
         )
     )
     found = as_unsure(told, wide, fit, USUAL)
@@ -35,7 +36,8 @@ def test_sizes_of_effects_are_as_unsure_wherever_they_stand(
     reach = [0.1 + USUAL.bound * s for s in (0.03, 0.06)]
     assert found["force_gain"].bound == pytest.approx(reach)
     assert "; " not in found["wheel_inertia"].sentence.split("driving")[1]
-    assert found["gyro_bias"] == told["gyro_bias"]
+    for name in ("gyro_bias", "aero_drag"):  # told beside the effect, not in its place
+        assert found[name] == told[name]
 
 
 def test_effects_and_verdicts_tell_one_size(start: Model, truth: Model) -> None:

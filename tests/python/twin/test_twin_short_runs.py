@@ -1,27 +1,19 @@
 """Short runs on simulators of others are judged as long ones are."""
 
-from typing import Any
-
 import numpy as np
 import pytest
+from pulled_car import DT, MASS, twin
 
 from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.twin import (
-    CallableTwin,
     Observation,
     Observer,
     SideBySide,
-    Unknown,
     observe_with,
 )
 
-DT, N = 0.01, 1500
+N = 1500
 FORCE_N = 800.0 + 1500.0 * np.sin(0.8 * DT * np.arange(N))
-MASS = Unknown("mass_kg", spread=300.0, apart=10.0, lower=500.0, upper=2000.0)
-
-
-def pulled(x: np.ndarray, u: np.ndarray, p: dict[str, float]) -> Any:
-    return (u[0] - 50.0 * x[0]) / p["mass_kg"]
 
 
 def car() -> np.ndarray:
@@ -36,18 +28,8 @@ def car() -> np.ndarray:
 def found(
     readings: np.ndarray, force: np.ndarray = FORCE_N, speed: float = 10.0, stride: int = 10
 ) -> Observation:
-    twin = CallableTwin(
-        lambda x, u, p: x + DT * pulled(x, u, p),
-        lambda x, u, p: np.array([x[0], pulled(x, u, p)]),
-        np.array([speed]),
-        dt_s=DT,
-        input_names=("force_n",),
-        output_names=("vx_mps", "ax_mps2"),
-        state_names=("vx_mps",),
-        parameters={"mass_kg": 1000.0},
-    )
     observer = Observer(batch=SideBySide([MASS], {"ax_mps2": 0.05}))
-    return observe_with(twin, force[:, None], {"ax_mps2": readings}, observer, stride=stride)
+    return observe_with(twin(speed), force[:, None], {"ax_mps2": readings}, observer, stride=stride)
 
 
 @pytest.mark.parametrize("stride", [1, 10, 500])

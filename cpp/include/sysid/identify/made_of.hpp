@@ -1,5 +1,4 @@
-// What a filter ran on, so that one who asks for its path knows whether it is the one that was
-// told.
+// What a filter ran on: whoever asks for a path knows whether it is the one that was told.
 #pragma once
 
 #include <cstdint>

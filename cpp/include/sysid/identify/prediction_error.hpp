@@ -49,6 +49,15 @@ struct FrozenFilter {
     double* whitener(std::size_t run, std::size_t k) {
         return gain(run, k) + rows.size() * kChannels;
     }
+    /// Errors of a sample, whitened; zero where a measurement is missing.
+    void whiten(std::size_t run, std::size_t k, const double* error, double* to) const {
+        const double* row = whitener(run, k);
+        for (std::size_t i = 0; i < kChannels; ++i) {
+            double sum = 0.0;
+            for (std::size_t j = 0; j <= i; ++j) sum += *row++ * error[j];
+            to[i] = sum;
+        }
+    }
     /// Numbers that tell how a sample was filtered: innovations, zero where a measurement is
     /// missing, means of the states after them, the lower triangle of their covariance. Of a
     /// problem with more than `kToldSamples` they are not kept.

@@ -178,8 +178,7 @@ class _Beside:
         # Beside its rival it explains nothing: its size is that of the model without it.
         value, std = self.refitted.get(effect.id, ((), ()))
         bound = bound_of(effect, value, std, self.rules) if value else ()
-        finding: Finding = "one of a group"
-        return EffectVerdict(effect, finding, value, std, bound, instead)
+        return EffectVerdict(effect, "one of a group", value, std, bound, instead)
 
 
 def _all_added(

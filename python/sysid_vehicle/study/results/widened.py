@@ -55,12 +55,13 @@ def as_unsure(told: Verdicts, wide: Sequence[Estimate], fit: Fit, rules: Rules) 
     }
 
     def wider(v: EffectVerdict) -> EffectVerdict:
-        there = [times[e] for e in (v.effect.id, *v.group) if e in times]
-        if not v.value or not there:
+        there = [times[e] for e in v.group if e in times]
+        if v.value and v.effect.id in times:
+            std = tuple(by.get(n, s) for n, s in zip(v.effect.named, v.std, strict=True))
+        elif v.value and v.finding == "one of a group" and there:
+            std = tuple(max(there) * s for s in v.std)
+        else:
             return v
-        names, std = v.effect.named, tuple(max(there) * s for s in v.std)
-        if v.effect.id in times:
-            std = tuple(by.get(n, s) for n, s in zip(names, v.std, strict=True))
         return replace(v, std=std, bound=bound_of(v.effect, v.value, std, rules))
 
     return Verdicts(tuple(map(wider, told.all)))
