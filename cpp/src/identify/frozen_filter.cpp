@@ -4,11 +4,10 @@
 #include <optional>
 
 #include "sysid/dynamics/steer_delay.hpp"
-#include "sysid/estimate/frozen.hpp"
 #include "sysid/identify/in_time.hpp"
 #include "sysid/identify/lane_filter.hpp"
 #include "sysid/identify/prediction_error.hpp"
-#include "sysid/identify/run_system.hpp"
+#include "sysid/identify/row_filter.hpp"
 
 namespace sysid {
 
@@ -29,30 +28,27 @@ void freeze_run(const Problem& problem, std::size_t number, const double* p, Fro
             from[i] = system.packed(i - kMotionStates);
     }
     std::vector<int>& substeps = filter.runs[number].substeps;
-    filter.log_likelihood +=
-        filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
-            double* to = filter.gain(number, k);
-            for (const int row : from)
-                for (int c = 0; c < kChannels; ++c) *to++ = s.update.gain(row, c);
-            const auto whitener = whitener_of<kChannels>(s.update, run.measurements[k]);
-            for (int i = 0; i < kChannels; ++i)
-                for (int j = 0; j <= i; ++j) *to++ = whitener(i, j);
-            if (filter.tells()) {
-                to = filter.told(number, k);
-                for (int c = 0; c < kChannels; ++c)
-                    *to++ = std::isnan(run.measurements[k][c]) ? 0.0 : s.update.innovation[c];
-                for (const int row : from) *to++ = s.mean[row];
-                for (std::size_t i = 0; i < n; ++i)
-                    for (std::size_t j = 0; j <= i; ++j) *to++ = s.covariance(from[i], from[j]);
-            }
-            if (k + 1 < run.size()) {
-                substeps[k + 1] = substeps_for(problem.model, p, s.mean[0], run.dt);
-                return;
-            }
+    filter.log_likelihood += filter_rows_of<NX>(system, [&](std::size_t k, const auto& s) {
+        double* to = filter.gain(number, k);
+        for (const int row : from)
+            for (int c = 0; c < kChannels; ++c) *to++ = s.gain(row, c);
+        for (int i = 0; i < kChannels; ++i)
+            for (int j = 0; j <= i; ++j) *to++ = s.whitener(i, j);
+        if (filter.tells()) {
+            to = filter.told(number, k);
+            for (int c = 0; c < kChannels; ++c) *to++ = s.innovation(c);
+            for (const int row : from) *to++ = s.mean(row);
             for (std::size_t i = 0; i < n; ++i)
-                filter.deviations[i] =
-                    std::max(filter.deviations[i], std::sqrt(s.covariance(from[i], from[i])));
-        });
+                for (std::size_t j = 0; j <= i; ++j) *to++ = s.covariance(from[i], from[j]);
+        }
+        if (k + 1 < run.size()) {
+            substeps[k + 1] = substeps_for(problem.model, p, s.mean(0), run.dt);
+            return;
+        }
+        for (std::size_t i = 0; i < n; ++i)
+            filter.deviations[i] =
+                std::max(filter.deviations[i], std::sqrt(s.covariance(from[i], from[i])));
+    });
 }
 
 /// A filter with room for all samples.

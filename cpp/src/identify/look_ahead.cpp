@@ -6,7 +6,7 @@
 #include "sysid/identify/in_time.hpp"
 #include "sysid/identify/lane_filter.hpp"
 #include "sysid/identify/prediction_error.hpp"
-#include "sysid/identify/run_system.hpp"
+#include "sysid/identify/row_filter.hpp"
 #include "sysid/identify/side_by_side.hpp"
 #include "sysid/math/interrupt.hpp"
 
@@ -45,12 +45,12 @@ class FilteredStates {
     void one_after_the_other(const Problem& problem, std::size_t number, const double* p,
                              const Noise& noise) {
         const RunSystem<NX> system(problem.model, problem.runs[number], p, noise);
-        double* to = runs_[number].data();
-        filter_run<NX>(system, [&](std::size_t /*k*/, const FilterStep<NX, kChannels>& s) {
-            for (int i = 0; i < kMotionStates; ++i) *to++ = s.mean[i];
-            for (std::size_t i = 0; i < system.own().count; ++i) *to++ = s.mean[system.packed(i)];
+        filter_rows_of<NX>(system, [&](std::size_t k, const auto& s) {
+            double* to = runs_[number].data() + k * width_;
+            for (int i = 0; i < kMotionStates; ++i) *to++ = s.mean(i);
+            for (std::size_t i = 0; i < system.own().count; ++i) *to++ = s.mean(system.packed(i));
             for (std::size_t i = 0; i < system.disturbances(); ++i)
-                *to++ = s.mean[system.disturbing(i)];
+                *to++ = s.mean(system.disturbing(i));
         });
     }
 

@@ -13,6 +13,7 @@ namespace {
 constexpr double kForgotten = 4.5;  // seconds in which a filter forgets its beginning at best
 const double kTimesMet = -std::log(kMet);  // time constants until two ways have met
 constexpr int kDoublings = 30;             // of samples, in which a filter forgets
+constexpr std::size_t kFewOwnStates = 6, kFilterSamplesOfFew = 3, kFilterSamplesOfMany = 2;
 
 std::vector<Piece> cut(const std::vector<Run>& runs, std::size_t longest) {
     std::vector<Piece> pieces;
@@ -115,7 +116,9 @@ double forgets_s(const Problem& problem, const Noise& noise) {
 }
 
 std::size_t filter_samples(const SingleTrack& model) {
-    return active_states(model.effects).count > 0 ? kFilterSamples / 2 : kFilterSamples;
+    const std::size_t own = active_states(model.effects).count;
+    if (own == 0) return kFilterSamples;
+    return own <= kFewOwnStates ? kFilterSamplesOfFew : kFilterSamplesOfMany;
 }
 
 std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s,

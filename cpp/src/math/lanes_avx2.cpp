@@ -6,13 +6,14 @@
 #include "lanes.inc"
 #include "lanes_back.inc"
 #include "lanes_filter.inc"
+#include "lanes_rows.inc"
 #include "lanes_score.inc"
 #include "lanes_sums.inc"
 
 extern const LaneKernels kAvx2Lanes;
-const LaneKernels kAvx2Lanes{"AVX2",       &forward,       &backward,     &add_product,
-                             &add_squares, &curve_squares, &propagate,    &disturb,
-                             &correct,     &score_update,  &score_predict};
+const LaneKernels kAvx2Lanes{
+    "AVX2",   &forward, &backward,       &add_product,  &add_squares,  &curve_squares, &propagate,
+    &disturb, &correct, &propagate_rows, &correct_rows, &score_update, &score_predict};
 
 }  // namespace sysid
 #endif

@@ -116,6 +116,20 @@ TEST(Told, IsNotTakenForThatOfOthers) {
     EXPECT_TRUE(filter.made_of.is(Problem(problem), p.data()));
 }
 
+/// The log-likelihood is that of the careful filter to the last digit where care is needed alone.
+TEST(Told, WhereRoundingMayCountTheFilterIsTheCarefulOne) {
+    const Parameters p = typical_parameters();
+    const Problem problem = runs_of(EffectMask{0}, 120);
+    for (const double sure : {1.0, 1e-7}) {
+        Noise noise = sloping_noise();
+        noise.sensor[kVx] *= sure;
+        const double found = freeze(problem, p.data(), noise).log_likelihood;
+        const double careful = trace(problem, p.data(), noise, false).log_likelihood;
+        EXPECT_NEAR(found, careful, 1e-9 * std::abs(careful)) << sure;
+        EXPECT_EQ(found == careful, sure < 1.0);
+    }
+}
+
 TEST(Told, TraceIsThatOfTheFilter) {
     const Parameters p = typical_parameters();
     for (const EffectMask effects : {EffectMask{0}, kLagging})

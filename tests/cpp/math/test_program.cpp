@@ -2,24 +2,15 @@
 #include <random>
 
 #include "helpers.hpp"
+#include "kernels.hpp"
 #include "sysid/identify/prediction_error.hpp"
-#include "sysid/math/lanes.hpp"
 #include "sysid/math/recorder.hpp"
 
 namespace sysid::test {
 namespace {
 
-/// Puts the kernels back that a test has exchanged.
-class Kernels : public testing::TestWithParam<const LaneKernels*> {
-  protected:
-    void SetUp() override { use_lane_kernels(*GetParam()); }
-    void TearDown() override { use_lane_kernels(*all_lane_kernels().back()); }
-};
-INSTANTIATE_TEST_SUITE_P(All, Kernels, testing::ValuesIn(all_lane_kernels()), [](const auto& it) {
-    std::string name = it.param->name;
-    std::erase(name, '-');
-    return name;
-});
+class Kernels : public OfEachProcessor {};
+INSTANTIATE_TEST_SUITE_P(All, Kernels, testing::ValuesIn(all_lane_kernels()), kernels_name);
 
 constexpr std::size_t kAsked = 21;
 

@@ -166,9 +166,9 @@ void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* exter
         model.evaluate(x.data(), external, lags, u, p, rate.data());
 }
 
-/// Directions that one pass through the model differentiates by: states in a filter, and in one
-/// with states of many effects.
-constexpr int kStatePass = 6, kWideStatePass = 9;
+/// Directions that one pass through the model differentiates by: states in a filter, in one with
+/// states of many effects, and in one whose states fill one such pass and not two.
+constexpr int kStatePass = 6, kWideStatePass = 9, kWidestStatePass = 12;
 
 // The model takes seconds to compile for each scalar. These are what kernels use; each is compiled
 // once, by the files of this name in `src/dynamics/`.
@@ -190,6 +190,7 @@ SYSID_COMPILED_MODEL(extern, double, double)
 SYSID_COMPILED_MODEL(extern, Dual<kMotionStates>, double)
 SYSID_COMPILED_MODEL(extern, Dual<kStatePass>, double)
 SYSID_COMPILED_MODEL(extern, Dual<kWideStatePass>, double)
+SYSID_COMPILED_MODEL(extern, Dual<kWidestStatePass>, double)
 SYSID_COMPILED_MODEL(extern, Recorded, Recorded)
 
 }  // namespace sysid

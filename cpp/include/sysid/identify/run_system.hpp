@@ -68,6 +68,13 @@ class RunSystem {
 
     Vec<NX> predict(std::size_t k, const Vec<NX>& x, Mat<NX, NX>& A, Mat<NX, NX>& Q) const {
         A.setZero();
+        Q = process_;
+        return moved(k, x, A);
+    }
+
+    /// x(k) from x(k-1), and what is not zero of the Jacobian, an `A(i, j)` that is zero elsewhere.
+    template <class Matrix>
+    Vec<NX> moved(std::size_t k, const Vec<NX>& x, Matrix& A) const {
         Vec<NX> next = Vec<NX>::Zero();
         for (std::size_t i = 0; i < disturbances_; ++i) {
             const int at = disturbing(i);
@@ -82,13 +89,18 @@ class RunSystem {
                 keep(s[static_cast<std::size_t>(i)], i, next, A);
             for (std::size_t i = 0; i < own_.count; ++i) keep(s[place(i)], packed(i), next, A);
         });
-        Q = process_;
         return next;
     }
 
     Vec<kChannels> observe(std::size_t k, const Vec<NX>& x, Mat<kChannels, NX>& H) const {
-        Vec<kChannels> expected;
         H.setZero();  // not every pass is made
+        return seen(k, x, H);
+    }
+
+    /// The expected measurement, and what is not zero of its Jacobian, as `moved`.
+    template <class Matrix>
+    Vec<kChannels> seen(std::size_t k, const Vec<NX>& x, Matrix& H) const {
+        Vec<kChannels> expected;
         in_passes(x, [&](ModelState<D>& s, const auto& external, auto&& keep) {
             const auto y = sense(model_, s, external.data(), run_.inputs[k], p_);
             for (int i = 0; i < kChannels; ++i)
@@ -114,6 +126,8 @@ class RunSystem {
     /// States that take part.
     int taking_part() const { return kMotionStates + static_cast<int>(disturbances_ + own_.count); }
     double forget(std::size_t i) const { return forget_[i]; }
+    /// Variance that a sample adds to state number `i`.
+    double process_noise(int i) const { return process_(i, i); }
 
     const Vec<kChannels>& measurement(std::size_t k) const { return run_.measurements[k]; }
     const Mat<kChannels, kChannels>& measurement_noise(std::size_t /*k*/) const { return sensors_; }
@@ -122,6 +136,7 @@ class RunSystem {
     // So many directions at once: the model is compiled for few widths.
     static constexpr int kPass = [] {
         if (NX == kMotionStates) return static_cast<int>(kMotionStates);
+        if (NX == kWidestStatePass) return kWidestStatePass;
         return NX % kWideStatePass == 0 ? kWideStatePass : kStatePass;
     }();
     static_assert(NX % kPass == 0);

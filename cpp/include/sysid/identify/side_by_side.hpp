@@ -31,8 +31,8 @@ double forgets_s(const Problem& problem, const Noise& noise);
 /// frozen gains and of the filter.
 constexpr std::size_t kPathSamples = 6, kFilterSamples = 4;
 
-/// The same of the filter of a model. With states of effects a single sample has room for those of
-/// all of them, lanes have no more than there are.
+/// The same of the filter of a model. With states of effects a single sample takes another stage of
+/// the step, with many of them two passes through the model; lanes take what there is.
 std::size_t filter_samples(const SingleTrack& model);
 
 /// How runs are cut so that the lanes are full, into pieces of so many samples at most; nothing

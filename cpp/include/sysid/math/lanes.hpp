@@ -27,6 +27,18 @@ struct LaneUpdate {
     LaneRow* gain = nullptr;        // states x readings, of the innovations of the whole sample
     LaneRow* whitener = nullptr;    // of those, a lower triangle
 };
+/// The same of one filter alone: matrices of states stand row after row, `stride` numbers each, a
+/// multiple of eight.
+struct RowUpdate {
+    std::size_t states = 0, readings = 0, stride = 0, observation_stride = 0;
+    const double* observation = nullptr;  // readings x states
+    const double* noise = nullptr;        // variances
+    const bool* present = nullptr;
+    double* innovation = nullptr;  // becomes that of the state that has seen the readings before
+    double* variance = nullptr;    // of that one
+    double* gain = nullptr;        // readings x states, of the innovations of the whole sample
+    double* whitener = nullptr;    // of those, a lower triangle
+};
 /// Derivatives of mean and covariance of one filter by `width` parameters of its noise, a multiple
 /// of eight; the first are those of the `kScoredReadings` readings.
 struct LaneScore {
@@ -72,6 +84,12 @@ struct LaneKernels {
                     LaneRow* P);
     /// Mean and covariance after the readings.
     void (*correct)(const LaneUpdate& u, LaneRow* x, LaneRow* P);
+    /// A P A' plus the diagonal `noise` in place of P, of a filter alone; A stands column after
+    /// column.
+    void (*propagate_rows)(const double* A, const double* noise, std::size_t n, std::size_t stride,
+                           double* P);
+    /// Mean and covariance of a filter alone after the readings.
+    void (*correct_rows)(const RowUpdate& u, double* x, double* P);
     /// The derivatives after the readings, and `rows`.
     void (*score_update)(const LaneScore& s);
     /// The derivatives at the next sample: the first `moving` states have rows of A (moving x
