@@ -83,6 +83,33 @@ def test_what_a_fit_means_is_worked_out_for_a_car_without_its_effects(
     assert found["cornering stiffness rear"] == pytest.approx(rear)
 
 
+def test_cornering_stiffness_is_that_at_the_load_of_the_car_that_was_found(
+    fit: Fit, car: Vehicle
+) -> None:
+    """Mass and place of the centre of gravity change the loads by which the stiffness counts."""
+    error, back = 0.11, 0.09
+    given = {"mass.relative_error": error, "cg_position.shift_rearward_m": back}
+    model = fit.model.add(*(name.split(".")[0] for name in given)).with_values(given)
+    heavier = car.replace(
+        mass_kg=(1.0 + error) * car.mass_kg, lf_m=car.lf_m + back, lr_m=car.lr_m - back
+    )
+    told, wanted = fit.values_of(model), fit.values_of(Model(heavier).with_values(_tyres(fit)))
+    assert told == pytest.approx(wanted)
+    assert told["cornering stiffness rear"] > 1.15 * fit["cornering stiffness rear"].value
+    found = refine(model, fit.driving, fit.noise)
+    p, columns = found.model.vector(), found.columns
+    for axle in ("front", "rear"):
+        what = found.quantities[f"cornering stiffness {axle}"]
+        slope = np.array([(what.of(p + d) - what.of(p - d)) / 2e-6 for d in 1e-6 * np.eye(p.size)])
+        std = np.sqrt(slope[columns] @ found.covariance @ slope[columns])
+        assert found[what.name].std == pytest.approx(std, rel=1e-3)
+
+
+def _tyres(fit: Fit) -> dict[str, float]:
+    names = [f"{letter}_{axle}" for letter in "BCDE" for axle in ("front", "rear")]
+    return {name: fit.model.value(name) for name in names}
+
+
 def test_nuisances_cost_next_to_no_information(fit: Fit) -> None:
     found = refine(fit.model.with_nuisances(), fit.driving, fit.noise)
     base = [i for i, e in enumerate(found.estimates) if "." not in e.name]
