@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -152,6 +153,29 @@ def test_improve_without_report_prints_alone(
     assert f"Verdict: {result['verdict']}" in told
     assert "Report:" not in told
     assert sorted(folder.iterdir()) == there
+
+
+def test_improve_prints_the_intervals_that_it_writes(
+    improved: tuple[Path, dict[str, Any]],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where something is missing those of the fit, which knows of noise alone, are too narrow."""
+    folder, _ = improved
+    study = STUDIES[0][1]
+    unsure = replace(study, widened=9.0 * study.fit.covariance)
+    monkeypatch.setattr(commands, "improve", lambda *_, **__: unsure)
+    car, file = str(folder / "car.toml"), folder / "unsure.json"
+    capsys.readouterr()
+    assert main(["improve", str(folder / "lap.csv"), "--vehicle", car, "--json", str(file)]) == 0
+    written = json.loads(file.read_text(encoding="utf-8"))["parameters"]
+    file.unlink()
+    lines = capsys.readouterr().out.splitlines()
+    for name in ("steer_lag.time_constant_s", "cornering stiffness front"):
+        (line,) = (line for line in lines if line.startswith(f"  {name} "))
+        std = float(line.removeprefix(f"  {name}").split()[1])
+        assert std == pytest.approx(written[name]["std"], rel=0.06)
+        assert std == pytest.approx(3.0 * study.fit[name].std, rel=0.06)
 
 
 def test_diagnose_prints_the_ranking_and_has_the_keys_of_improve(
