@@ -12,6 +12,7 @@ import numpy as np
 from .._common.arrays import FloatArray, as_float64
 from .._common.tables import frame
 from .._common.text import HALF_95, brief, html_list, html_paragraph, html_table, number, text_table
+from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
@@ -22,6 +23,7 @@ from .intervals.priors import AgainstPrior, against_priors
 from .intervals.profile import Profile
 from .intervals.quantities import Quantity, parameter, std_of, tyre_quantity
 from .loads import LoadAtRest
+from .reached import reached
 from .search.starts import Starts
 from .search.tyre_shape import COMBINATIONS
 
@@ -116,10 +118,13 @@ class Fit(Estimated):
         [1] and slip angle of that peak [rad], which is infinite where the curve has none; `not
         determined` where the 95 % interval reaches nothing. Driving that never reaches the peak
         determines the stiffness long before it determines B, C, D and E one by one. Each is found
-        by the name it is printed with, and by that name with underscores.
+        by the name it is printed with, and by that name with underscores. A peak beyond the slip
+        angles that the driving reached is `extrapolated`: its interval takes the tyre for a magic
+        formula as far as that.
         """
         p, columns = self.model.vector(), self.columns
         found, exactly = [], {f.name for f in self.profiles}
+        beyond = self._peaks_beyond(p)
         for what in tuple(self.quantities.values())[len(self.estimates) :]:
             std = std_of(what, p, columns, self.covariance)
             unit = _UNITS[what.name.rsplit(" ", 1)[0]]
@@ -127,8 +132,20 @@ class Fit(Estimated):
             # None of them is negative: an interval that reaches nothing tells nothing.
             wide = value < HALF_95 * std and what.name not in exactly
             note = "no peak" if not np.isfinite(std) else "not determined" if wide else ""
+            if not note and what.name in beyond:
+                note = "extrapolated"
             found.append(Estimate(what.name, value, std, unit, note, bounds=_OF_TYRES))
         return tuple(profiled(e, self.profiles) for e in found)
+
+    def _peaks_beyond(self, p: FloatArray) -> set[str]:
+        """Names of what is told of peaks that lie beyond what the driving reached."""
+        try:
+            most = dict(zip(AXLES, reached(self), strict=True))
+        except NumericalError:
+            return set()
+        peaks = {axle: self.quantities[f"slip at the peak {axle}"].of(p) for axle in AXLES}
+        far = [axle for axle in AXLES if not peaks[axle] <= most[axle]]
+        return {f"{what} {axle}" for what in ("peak friction", "slip at the peak") for axle in far}
 
     @property
     def against_priors(self) -> tuple[AgainstPrior, ...]:

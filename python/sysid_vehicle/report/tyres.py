@@ -9,8 +9,8 @@ import numpy as np
 from .._common.arrays import FloatArray, as_float64
 from ..identify import Fit
 from ..identify.loads import LOADING
+from ..identify.reached import RARE
 from ..model import Model
-from ..study.ahead.fitted_range import RARE
 from ..vehicle import AXLES
 
 # Columns of the core's evaluation, front and rear.

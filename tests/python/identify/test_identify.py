@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import fields, replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -62,6 +63,25 @@ def test_derived_quantities_are_found_by_name(fit: Fit) -> None:
     }
     with pytest.raises(KeyError, match="there are"):
         fit["cornering stiffness middle"]
+
+
+def test_a_peak_that_the_driving_did_not_reach_is_extrapolated(
+    fit: Fit, truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By noise alone a curve seems to be known as far as its formula goes."""
+    gentle = drive(truth, manoeuvres.lap(30.0, 3.0), seed=11)
+    below = refine(fit.model, Driving.of(gentle), fit.noise)
+    sure = replace(below, covariance=1e-6 * below.covariance)
+    for axle in ("front", "rear"):
+        for what in ("peak friction", "slip at the peak"):
+            assert sure[f"{what} {axle}"].note == "extrapolated"
+            assert sure[f"{what} {axle}"].value == below[f"{what} {axle}"].value
+        assert sure[f"cornering stiffness {axle}"].note == ""
+    # Where an axle goes beyond its peak that is told without a note.
+    module = import_module("sysid_vehicle.identify.fit")
+    monkeypatch.setattr(module, "reached", lambda _: (0.5, 0.001))
+    assert sure["slip at the peak front"].note == sure["peak friction front"].note == ""
+    assert sure["slip at the peak rear"].note == sure["peak friction rear"].note == "extrapolated"
 
 
 def test_a_meaning_whose_interval_reaches_nothing_is_not_determined(fit: Fit) -> None:
