@@ -140,7 +140,7 @@ class Fit(Estimated):
     def _peaks_beyond(self, p: FloatArray) -> set[str]:
         """Names of what is told of peaks that lie beyond what the driving reached."""
         try:
-            most = dict(zip(AXLES, reached(self), strict=True))
+            most = dict(zip(AXLES, reached(self.model, self.noise, self.driving), strict=True))
         except NumericalError:
             return set()
         peaks = {axle: self.quantities[f"slip at the peak {axle}"].of(p) for axle in AXLES}

@@ -76,8 +76,8 @@ def fitted(fit: Fit, driving: Driving, rules: Rules = USUAL) -> Bools:
     if driving is fit.driving:
         return every
     try:
-        most = np.percentile(slips(fit, fit.driving), RARE, axis=1)
-        within = np.asarray((slips(fit, driving_of(fit, driving)) <= most[:, None]).all(axis=0))
+        most = np.percentile(_slips(fit, fit.driving), RARE, axis=1)
+        within = np.asarray((_slips(fit, driving) <= most[:, None]).all(axis=0))
         squares = _squares(fit, driving)
     except NumericalError:
         return every
@@ -86,6 +86,11 @@ def fitted(fit: Fit, driving: Driving, rules: Rules = USUAL) -> Bools:
     beyond, inside = squares[~within], float(np.mean(squares[within]))
     least = np.mean(beyond) - rules.bound * np.std(beyond) / np.sqrt(len(beyond))
     return within if share_of(float(least), inside) > rules.explainable else every
+
+
+@remembered(16)
+def _slips(fit: Fit, driving: Driving) -> FloatArray:
+    return slips(fit.model, fit.noise, driving_of(fit, driving))
 
 
 def _squares(fit: Fit, driving: Driving) -> FloatArray:
