@@ -54,6 +54,8 @@ def contradictions(text: str) -> list[str]:
     if re.search(r"explains? (-|nan)", text) or re.search(r"remove (-|nan)", text):
         found.append("a share below nothing is explained")
     if "the effects added do not reduce it" in text:
+        if "the effects added explain part of it" in text:
+            found.append("what was added explains a part, and does not reduce it")
         if re.search(r"effects added (remove|explain) [1-9]", text):
             found.append("what was added takes a part off the error, and nothing")
         ahead = re.search(r"s ahead on validation data: ([^;]*?)\. [A-Z]", text)

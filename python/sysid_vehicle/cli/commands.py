@@ -94,7 +94,8 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     _print_where(study)
     if study.unknown is not None:
         print(study.unknown)
-    print(study.fit)
+    # With the intervals of the study, which include what is missing.
+    print(study.fit.text(study.estimates))
     if args.json is not None:
         study.to_json(args.json)
     if args.report is not None:

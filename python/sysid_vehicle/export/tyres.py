@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..errors import InvalidInput
+from ..identify.loads import LoadAtRest
 from ..model import Model
 
 _LINEAR = 1000.0  # PKY2 with which the stiffness is proportional to the load to 1e-6
@@ -24,7 +25,7 @@ def tir_text(model: Model, axle: str) -> str:
     """
     b, c, d, e = (model.value(f"{letter}_{axle}") for letter in "BCDE")
     car = model.vehicle
-    load = 0.5 * car.static_loads_n[0 if axle == "front" else 1]
+    load = 0.5 * LoadAtRest(model, axle)(model.vector())
     loss = model.value(_SENSITIVITY) if "tyre_load_sensitivity" in model.effects else 0.0
     if not 0.0 <= loss < 1.0:
         raise InvalidInput(

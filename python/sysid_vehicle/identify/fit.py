@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +12,7 @@ import numpy as np
 from .._common.arrays import FloatArray, as_float64
 from .._common.tables import frame
 from .._common.text import HALF_95, brief, html_list, html_paragraph, html_table, number, text_table
+from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
@@ -20,6 +22,8 @@ from .intervals.posterior import Posterior, posterior
 from .intervals.priors import AgainstPrior, against_priors
 from .intervals.profile import Profile
 from .intervals.quantities import Quantity, parameter, std_of, tyre_quantity
+from .loads import LoadAtRest
+from .reached import reached
 from .search.starts import Starts
 from .search.tyre_shape import COMBINATIONS
 
@@ -110,14 +114,17 @@ class Fit(Estimated):
     def derived(self) -> tuple[Estimate, ...]:
         """What the tyre coefficients of an axle mean together.
 
-        Cornering stiffness [N/rad], highest friction [1] and slip angle of that peak [rad], which
-        is infinite where the curve has none; `not determined` where the 95 % interval reaches
-        nothing. Driving that never reaches the peak determines the stiffness long before it
-        determines B, C, D and E one by one. Each is found by the name it is printed with, and by
-        that name with underscores.
+        Cornering stiffness at the load at rest of the car that was found [N/rad], highest friction
+        [1] and slip angle of that peak [rad], which is infinite where the curve has none; `not
+        determined` where the 95 % interval reaches nothing. Driving that never reaches the peak
+        determines the stiffness long before it determines B, C, D and E one by one. Each is found
+        by the name it is printed with, and by that name with underscores. A peak beyond the slip
+        angles that the driving reached is `extrapolated`: its interval takes the tyre for a magic
+        formula as far as that.
         """
         p, columns = self.model.vector(), self.columns
         found, exactly = [], {f.name for f in self.profiles}
+        beyond = self._peaks_beyond(p)
         for what in tuple(self.quantities.values())[len(self.estimates) :]:
             std = std_of(what, p, columns, self.covariance)
             unit = _UNITS[what.name.rsplit(" ", 1)[0]]
@@ -125,8 +132,20 @@ class Fit(Estimated):
             # None of them is negative: an interval that reaches nothing tells nothing.
             wide = value < HALF_95 * std and what.name not in exactly
             note = "no peak" if not np.isfinite(std) else "not determined" if wide else ""
+            if not note and what.name in beyond:
+                note = "extrapolated"
             found.append(Estimate(what.name, value, std, unit, note, bounds=_OF_TYRES))
         return tuple(profiled(e, self.profiles) for e in found)
+
+    def _peaks_beyond(self, p: FloatArray) -> set[str]:
+        """Names of what is told of peaks that lie beyond what the driving reached."""
+        try:
+            most = dict(zip(AXLES, reached(self.model, self.noise, self.driving), strict=True))
+        except NumericalError:
+            return set()
+        peaks = {axle: self.quantities[f"slip at the peak {axle}"].of(p) for axle in AXLES}
+        far = [axle for axle in AXLES if not peaks[axle] <= most[axle]]
+        return {f"{what} {axle}" for what in ("peak friction", "slip at the peak") for axle in far}
 
     @property
     def against_priors(self) -> tuple[AgainstPrior, ...]:
@@ -154,12 +173,12 @@ class Fit(Estimated):
         """Estimates, then what follows from them, as functions of the core's parameter vector."""
         known = self.model.parameters
         found = [parameter(e.name, known[e.name].column) for e in self.estimates]
-        v = self.model.vehicle
-        for axle, load in zip(AXLES, v.static_loads_n, strict=True):
+        for axle in AXLES:
+            load = LoadAtRest(self.model, axle)
             columns = [known[f"{letter}_{axle}"].column for letter in "BCDE"]
             for short, (function, _) in COMBINATIONS.items():
-                factor = load if short == "BCD" else 1.0
-                found.append(tyre_quantity(f"{_MEANINGS[short]} {axle}", columns, function, factor))
+                own = load if short == "BCD" else None
+                found.append(tyre_quantity(f"{_MEANINGS[short]} {axle}", columns, function, own))
         return {what.name: what for what in found}
 
     def posterior(
@@ -208,9 +227,9 @@ class Fit(Estimated):
             "parameter",
         )
 
-    def _rows(self) -> list[list[str]]:
+    def _rows(self, told: Sequence[Estimate] = ()) -> list[list[str]]:
         rows = []
-        for e in (*self.estimates, *self.derived):
+        for e in told or (*self.estimates, *self.derived):
             std = number(e.std, 2) if np.isfinite(e.std) else "-"
             rows.append([e.name, number(e.value), std, e.interval_text(), e.unit, e.note])
         return rows
@@ -233,10 +252,14 @@ class Fit(Estimated):
 
     __repr__ = brief
 
-    def __str__(self) -> str:
-        table = text_table(self._head, self._rows())
+    def text(self, told: Sequence[Estimate] = ()) -> str:
+        """As it prints, with `told` in place of the estimates and what follows from them."""
+        table = text_table(self._head, self._rows(told))
         lines = [self._headline(), table, *self._warnings(), *self._by_log()]
         return "\n".join([*lines, "Noise", str(self.noise)])
+
+    def __str__(self) -> str:
+        return self.text()
 
     def _warnings(self) -> list[str]:
         return [f"Warning: {against}" for against in self.against_priors]

@@ -8,8 +8,9 @@ import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
 from ..identify import Fit
+from ..identify.loads import LOADING
+from ..identify.reached import RARE
 from ..model import Model
-from ..study.ahead.fitted_range import RARE
 from ..vehicle import AXLES
 
 # Columns of the core's evaluation, front and rear.
@@ -93,7 +94,7 @@ def identified_curves(fit: Fit) -> tuple[TyreCurve, TyreCurve]:
 
 def _forces(model: Model, slip_rad: FloatArray) -> FloatArray:
     """Lateral axle forces, slip angles x 2: sliding sideways without steering or acceleration."""
-    plain = model.drop(*model.effects)
+    plain = model.drop(*(e for e in model.effects if e not in LOADING))
     core, p = plain.core(force_known=False), plain.vector()
     return np.array(
         [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,6 +45,9 @@ class SensorFault:
         large enough to matter.
     why_not : str
         Why it cannot be told; empty where it can.
+    or_another : str
+        Name of the fault that stands in its place in an explanation that is as likely, where one of
+        the two is there; empty elsewhere.
     """
 
     name: str
@@ -56,6 +59,7 @@ class SensorFault:
     told: bool
     found: bool
     why_not: str = ""
+    or_another: str = ""
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -258,15 +262,25 @@ class _Asked:
         learned = 1.0 - variance / float(np.sum(1.0 / found.prior[pick > 0.0]))
         claimed = claimed and learned > 0.0
         well = rival is None and learned > _LEARNED and abs(value) + HALF_95 * std < told.enough
-        reason = ""
+        reason = another = ""
         if rival is not None:
-            reason = why_not(told.name, other=_instead(found, rival.estimate, told))
+            other = _instead(found, rival.estimate, told)
+            another = self._one_of_two(told, rival, other)
+            reason = why_not(told.name, other=other, there=bool(another))
         elif not (claimed or well):
             reason = _confounded(told, pick, found, self.naive, list(found.faults))
         return SensorFault(
             told.name, told.channel, told.title, value, std, told.unit, claimed or well, claimed,
-            reason,
+            reason, another,
         )  # fmt: skip
+
+    def _one_of_two(self, told: _Told, rival: Rival, other: str) -> str:
+        """Name of the fault that is there where this one is not, if that has to be so."""
+        twin = next((t for t in _TOLD if other in t.of), None)
+        if twin is None or not replace(self, rivals={}).fault(told).found:
+            return ""
+        there = replace(self, found=rival.estimate, parts=(), rivals={}).fault(twin).found
+        return twin.name if there else ""
 
     def _std(self, told: _Told, pick: np.ndarray) -> float:
         """Standard deviation of a fault, with what parts of the driving and rivals add."""

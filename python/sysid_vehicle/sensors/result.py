@@ -279,6 +279,10 @@ class SensorCheck:
             return f"{names}: 1 sensor fault was found.{filtered}"
         if self.found:
             return f"{names}: {len(self.found)} sensor faults were found.{filtered}"
+        either = {n: self[n] for f in self.faults if f.or_another for n in (f.name, f.or_another)}
+        if either:
+            which = " or ".join(f"{f.title} ({f.channel})" for f in either.values())
+            return f"{names}: the sensors do not agree: {which}.{filtered}"
         if not self.estimate.settled:
             return f"{names}: no fault was found, but the sensors do not agree.{filtered}"
         return f"{names}: the sensors agree; no fault was found.{filtered}"
@@ -368,6 +372,7 @@ class SensorCheck:
                     "found": f.found,
                     "told": f.told,
                     "why_not": f.why_not,
+                    "or_another": f.or_another,
                 }
                 for f in self.faults
             },

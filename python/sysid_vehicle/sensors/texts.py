@@ -45,13 +45,24 @@ ON_CORRECTION = (
 )
 
 
-def why_not(name: str, *, absent: Sequence[str] = (), alone: float = 0.0, other: str = "") -> str:
-    """Why a fault cannot be told: channels are missing, the driving is dull, or another acts so."""
+def why_not(
+    name: str,
+    *,
+    absent: Sequence[str] = (),
+    alone: float = 0.0,
+    other: str = "",
+    there: bool = False,
+) -> str:
+    """Why a fault cannot be told: channels are missing, the driving is dull, or another acts so.
+
+    `there` says that one of these two is there.
+    """
     if absent:
         return f"because {' and '.join(absent)} {'is' if len(absent) == 1 else 'are'} not logged"
     if alone:
         return f"because {_NEEDS_EXCITATION[name]}"
-    return f"because {_OTHER[other]} acts alike in this driving"
+    both = "; one of the two is there" if there else ""
+    return f"because {_OTHER[other]} acts alike in this driving{both}"
 
 
 def gradient(gain: float) -> float:

@@ -141,14 +141,15 @@ def improve(
             progress=progress,
             ends=schedule.baseline,
         )
-        found = Trail([baseline])
+        room = _room(train_driving, rules)
+        found = Trail([baseline], short=room <= most_effects)
         with kept(found):
             say(f"Fitted the baseline to {train_driving}.")
             search = Search(
                 test_driving,
                 candidates=wanted,
                 finer=finer,
-                most_effects=len(model.effects) + min(most_effects, _room(train_driving, rules)),
+                most_effects=len(model.effects) + min(most_effects, room),
                 ends=schedule.search,
                 judged_by=schedule.step,
                 rules=rules,

@@ -1,7 +1,9 @@
 """The command line: what it prints, what it writes, and how it fails."""
 
 import json
+import re
 import warnings
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -152,6 +154,19 @@ def test_improve_without_report_prints_alone(
     assert f"Verdict: {result['verdict']}" in told
     assert "Report:" not in told
     assert sorted(folder.iterdir()) == there
+
+
+def test_improve_prints_the_intervals_of_the_study(
+    improved: tuple[Path, dict[str, Any]],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where something is missing those of the fit, which knows of noise alone, are too narrow."""
+    study = replace(STUDIES[0][1], widened=9.0 * STUDIES[0][1].fit.covariance)
+    monkeypatch.setattr(commands, "improve", lambda *_, **__: study)
+    assert main(["improve", f"{improved[0]}/lap.csv", "--vehicle", f"{improved[0]}/car.toml"]) == 0
+    told = re.findall(r"^  C_front +\S+ +(\S+)", capsys.readouterr().out, re.M)
+    assert float(told[-1]) == pytest.approx(3.0 * study.fit["C_front"].std, rel=0.06)
 
 
 def test_diagnose_prints_the_ranking_and_has_the_keys_of_improve(

@@ -197,6 +197,14 @@ def test_sizes_are_drawn_in_units_of_the_typical_one(study: sv.Study) -> None:
         assert np.interp(float(dot[1]), x, value) == pytest.approx(expected, abs=0.01)
 
 
+def test_tyre_curves_are_those_at_the_load_of_the_car_that_was_found() -> None:
+    slip = np.linspace(0.0, 0.2, 11)
+    named = {"mass.relative_error": 0.1, "steer_ratio.ratio_error": 0.1}
+    model = TRUTH.add(*(n.split(".")[0] for n in named)).with_values(named)
+    for heavy, plain in zip(model_curves(model, slip), model_curves(TRUTH, slip), strict=True):
+        np.testing.assert_allclose(heavy.force_n, 1.1 * plain.force_n, rtol=1e-9)
+
+
 def test_tyre_curves_follow_the_magic_formula() -> None:
     slip = np.linspace(0.0, 0.2, 41)
     for curve, axle, arm in zip(

@@ -62,7 +62,6 @@ NUMERICAL = {
     "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
     "study/ahead/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
     "study/ahead/beyond.py": {"_DRAWS"},
-    "study/ahead/fitted_range.py": {"RARE"},
     "study/judge/foretold.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "study/limit.py": {"_BASELINE", "_SEARCHED", "_SENSORS", "_STEP"},
     "study/results/hidden.py": {"_MOST", "_SAMPLES"},

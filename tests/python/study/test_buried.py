@@ -1,6 +1,7 @@
 """Errors ahead that drown in the noise of the sensors: what can be named, and what is adequate."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,6 +50,10 @@ def test_a_name_stands_by_its_likelihood_where_no_error_shows() -> None:
     assert study.meaning.startswith("named: tyre_relaxation; the effects added explain part of it")
     assert "below the noise of the sensors" in study.meaning
     assert contradictions(str(study)) == []
+    assert study.explained is not None
+    none = replace(study, explained=replace(study.explained, share=-0.3, low=-0.7))
+    assert "explain part of the error one step ahead alone" in none.meaning
+    assert contradictions(str(none)) == []
 
 
 def test_a_baseline_whose_errors_drown_is_adequate() -> None:

@@ -69,7 +69,7 @@ def test_what_shows_in_validation_data_alone_is_not_adequate(hidden: Study) -> N
     assert hidden.added == ()
     text = str(hidden)
     assert "shows in the validation data; it hardly shows in the training data" in text
-    assert "the training data alone show no remaining error" in text
+    assert "the training data alone show no error that depends on the driving" in text
     assert "On all data together: an error that depends on the driving remains" in text
     assert "mostly in M_z" in text
     assert any("add driving like the validation data" in step for step in hidden.next_steps)

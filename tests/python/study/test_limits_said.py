@@ -1,9 +1,11 @@
 """What a study says that was not to look for more, or not to add more."""
 
+from dataclasses import replace
+
 import pytest
 from contradictions import contradictions
 
-from sysid_vehicle import Log, Model, drive, improve, manoeuvres
+from sysid_vehicle import Log, Model, Rules, drive, improve, manoeuvres
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +43,11 @@ def test_the_effect_that_found_no_room_is_told(start: Model, logs: tuple[Log, Lo
     found = improve(start, *logs, starts=1, candidates=both, most_effects=1)
     (added,) = (a.id for a in found.added)
     assert found.full == tuple(e for e in both if e != added)
-    assert any(f"evidence for {found.full[0]}: raise" in w for w in found.warnings)
+    (said,) = (w for w in found.warnings if f"evidence for {found.full[0]}: raise" in w)
+    assert "training data" not in said  # 30 s would bear more
+    few = improve(start, *logs, starts=1, candidates=both, rules=replace(Rules(), lasts=30.0))
+    (said,) = (w for w in few.warnings if f"evidence for {found.full[0]}: record more" in w)
+    assert "one for each 30 s of training data" in said
     whole = improve(start, *logs, starts=1, candidates=both)
     assert whole.full == ()
     assert not any("as many effects" in w for w in whole.warnings)

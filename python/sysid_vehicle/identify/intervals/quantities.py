@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
+from ..loads import LoadAtRest
 from ..search.tyre_shape import slope_of
 
 
@@ -43,17 +44,25 @@ def tyre_quantity(
     name: str,
     columns: Sequence[int],
     function: Callable[[FloatArray], float],
-    factor: float = 1.0,
+    load: LoadAtRest | None = None,
 ) -> Quantity:
-    """A function of the B, C, D, E that stand in `columns`, times a factor."""
+    """A function of the B, C, D, E that stand in `columns`, times a load where one is given."""
     where = list(columns)
+
+    def of(p: FloatArray) -> float:
+        value = function(as_float64(p[where]))
+        return value if load is None else load(p) * value
 
     def slope(p: FloatArray) -> FloatArray:
         out = np.zeros(len(p))
-        out[where] = factor * slope_of(function, as_float64(p[where]))
+        out[where] = slope_of(function, as_float64(p[where]))
+        if load is not None:
+            out *= load(p)
+            for column, by in load.slope(p).items():
+                out[column] = by * function(as_float64(p[where]))
         return out
 
-    return Quantity(name, lambda p: factor * function(as_float64(p[where])), slope)
+    return Quantity(name, of, slope)
 
 
 def std_of(what: Quantity, p: FloatArray, columns: list[int], covariance: FloatArray) -> float:

@@ -16,13 +16,10 @@ from ..._common.memo import remembered
 from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Fit, driving_of
+from ...identify.reached import RARE, slips
 from ...rules import USUAL, Rules, share_of
-from ...vehicle import slip_angles
 
 Bools = npt.NDArray[np.bool_]
-
-RARE = 99.5
-"""Percentile of slip angles up to which tyres count as fitted: larger ones may be outliers."""
 
 
 def within_fitted_range(
@@ -93,16 +90,7 @@ def fitted(fit: Fit, driving: Driving, rules: Rules = USUAL) -> Bools:
 
 @remembered(16)
 def _slips(fit: Fit, driving: Driving) -> FloatArray:
-    """Size of the slip angles by the filtered motion and the logged steering, (2, samples).
-
-    What effects do to the steering angle they do in all driving.
-    """
-    problem = driving_of(fit, driving).problem(fit.model)
-    motion = problem.trace(fit.model.vector(), fit.noise.vector(), False)["state"]
-    least = min(log.least_speed_mps for log in driving.logs)
-    vehicle, steer = fit.model.vehicle, driving.channel("steer_rad")
-    v_x, v_y, yaw_rate = np.maximum(motion[:, 0], least), motion[:, 1], motion[:, 2]
-    return as_float64(np.abs(slip_angles(vehicle.lf_m, vehicle.lr_m, steer, v_x, v_y, yaw_rate)))
+    return slips(fit.model, fit.noise, driving_of(fit, driving))
 
 
 def _squares(fit: Fit, driving: Driving) -> FloatArray:

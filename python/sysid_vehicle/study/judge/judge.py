@@ -339,10 +339,12 @@ def _warnings(
         found.append(_cut_short(trail.stopped, late))
         warn(found[-1])
     if trail.full:
+        most, remedy = "", "raise `most_effects` (`--max-effects`)"
+        if trail.short:
+            most, remedy = f", one for each {rules.lasts:g} s of training data", "record more"
         found.append(
-            "the search ended with as many effects as may be added, one for each "
-            f"{rules.lasts:g} s of training data at most; there is evidence for "
-            f"{few(trail.full)}: raise `most_effects` (`--max-effects`), or record more"
+            f"the search ended with as many effects as may be added{most}; there is evidence for "
+            f"{few(trail.full)}: {remedy}"
         )
     if trail.harmful:
         found.append(

@@ -70,8 +70,11 @@ def _unknown(study: Study) -> str:
 def _partly_explained(study: Study) -> str:
     named, taken = _named(study), study.explained
     if study.buried:
+        part = "part of it"
+        if taken is not None and not taken.share > 0.0:
+            part = "part of the error one step ahead alone"
         return (
-            f"{named}the effects added explain part of it; the errors that remain 0.5 to 5 s ahead "
+            f"{named}the effects added explain {part}; the errors that remain 0.5 to 5 s ahead "
             "are below the noise of the sensors"
         )
     if not taken:

@@ -205,7 +205,8 @@ def _on_train(study: Study) -> str:
     if not test.rejects and structured(study):
         return f"the test for unknown forces is not significant (p = {test.p_value:.2g})."
     if only_elsewhere(study):
-        return f"the training data alone show no remaining error (p = {test.p_value:.2g})."
+        none = "no error that depends on the driving"
+        return f"the training data alone show {none} (p = {test.p_value:.2g})."
     return f"{test}."
 
 

@@ -63,6 +63,8 @@ class Trail:
         Effects with evidence that the time limit left untried.
     full : tuple of str
         Effects with evidence that would have been one more than may be added.
+    short : bool
+        Whether the length of the training data says how many these are, not the user.
     taken_back : tuple of str
         Effects of last steps without which the model predicts better (`without_harm`).
     harmful : tuple of str
@@ -77,6 +79,7 @@ class Trail:
     sizes: dict[str, Size] = field(default_factory=dict)
     stopped: tuple[str, ...] = ()
     full: tuple[str, ...] = ()
+    short: bool = False
     taken_back: tuple[str, ...] = ()
     harmful: tuple[str, ...] = ()
 
