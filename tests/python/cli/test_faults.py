@@ -12,23 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from side_wind import side_wind
 
 import sysid_vehicle as sv
 from sysid_vehicle.cli import main
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals, devices and limits")
 
-EFFECT = """
-import pathlib
-from sysid_vehicle import define_effect, parameter
-pathlib.Path(__file__).with_suffix(".ran").touch()
-define_effect(
-    "of_a_file",
-    title="side wind",
-    parameters=[parameter("gain", "N", typical=100.0, lower=-1e3, upper=1e3)],
-    force_y=lambda d, p: p.gain + 0.0 * d.v_x,
-)
-"""
+RAN = 'import pathlib\npathlib.Path(__file__).with_suffix(".ran").touch()'
 
 
 @pytest.fixture
@@ -42,7 +33,7 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def effect_file(tmp_path: Path) -> Iterator[Path]:
-    (tmp_path / "e.py").write_text(EFFECT)
+    (tmp_path / "e.py").write_text(side_wind("of_a_file", RAN))
     yield tmp_path / "e.py"
     if any(e.id == "of_a_file" for e in sv.catalogue()):
         sv.forget_effect("of_a_file")
@@ -104,7 +95,7 @@ def test_the_users_source_is_no_output(
         capsys, command, log, "--vehicle", car, "--define", source, "--json", source, *more
     )
     assert f"{source}: is also an input of this command" in told
-    assert effect_file.read_text() == EFFECT
+    assert effect_file.read_text() == side_wind("of_a_file", RAN)
     assert not effect_file.with_suffix(".ran").exists()  # refused before it was run
 
 
