@@ -24,6 +24,9 @@ from .lags import lag_notes
 from .laws import (
     CLEARLY,
     EXCITED,
+    LIKE_G_KMH,
+    LIKE_KMH,
+    LIKE_MPH,
     MIN_WINDOWS,
     SCALE_STD,
     VX_KMH,
@@ -66,11 +69,11 @@ _RAD, _G = math.pi / 180.0, GRAVITY_MPS2
 _LATERAL_SLIPS: Slips = (
     (_RAD, (_YAW_DEG,)),
     (1.0 / _G, (_AY_G,)),
-    (1.0 / 3.6, (VX_KMH,)),
-    (0.44704, (VX_MPH,)),
+    (1.0 / 3.6, (VX_KMH,), LIKE_KMH),
+    (0.44704, (VX_MPH,), LIKE_MPH),
     (_RAD / _G, (_YAW_DEG, _AY_G)),
     (_RAD / 3.6, (_YAW_DEG, VX_KMH)),
-    (1.0 / _G / 3.6, (_AY_G, VX_KMH)),
+    (1.0 / _G / 3.6, (_AY_G, VX_KMH), LIKE_G_KMH),
     (_RAD / _G / 3.6, (_YAW_DEG, _AY_G, VX_KMH)),
 )
 _SLIDING_SLIPS: Slips = ((3.6, (_VY_KMH,)), (1.0 / 0.44704, (_VY_MPH,)))
