@@ -119,6 +119,9 @@ _SI = {
 _SIGN = {"vz", "vorzeichen", "sign", "sgn"}
 """Words in names of what is not 0 where another signal is negative."""
 
+_FAST = frozenset(("speed", "rpm", "omega", "geschw", "drehz", "drehzahl", "raddrehzahl"))
+"""Words in names of speeds of wheels."""
+
 _WHEELS = {  # in English and German
     **dict.fromkeys(("fl", "lf", "vl"), ("front", "left")),
     **dict.fromkeys(("fr", "rf", "vr"), ("front", "right")),
@@ -197,6 +200,11 @@ def sign_of(name: str, others: Iterable[str]) -> str:
         if {*there} & _SIGN and Counter({w: k for w, k in there.items() if w not in _SIGN}) == own:
             return other
     return ""
+
+
+def is_speed(name: str) -> bool:
+    """Tell whether a name says that it is one of a speed, along the ground or of turning."""
+    return not _FAST.isdisjoint(words(name).split())
 
 
 def wheel_of(name: str) -> tuple[str, str] | None:

@@ -11,6 +11,11 @@ from .channel_map import ChannelMap
 from .ground import PARTS, Ground
 from .source import Source
 
+_WHEELS = (
+    "take the axle that is not driven, and as the factor in rad/s the radius of its tyres [m], "
+    "in rpm 0.1047198 times that, in km/h 0.2777778"
+)
+
 
 @dataclass(frozen=True)
 class Proposed:
@@ -53,12 +58,15 @@ class Proposal:
         Velocity over ground and heading, by part, where they make the speeds of the body.
     counted_from : str
         Where its angles begin.
+    wheels : tuple of str
+        Columns of the wheels of one axle, in no unit of a speed, where there is no other speed.
     """
 
     channels: Mapping[str, Proposed]
     missing: tuple[str, ...]
     ground: Mapping[str, Proposed] = field(default_factory=dict)
     counted_from: str = "north"
+    wheels: tuple[str, ...] = ()
 
     @property
     def channel_map(self) -> ChannelMap:
@@ -85,8 +93,15 @@ class Proposal:
             entry += f", sign = {_quoted(p.sign)}" if p.sign else ""
             lines.append(f"{channel} = {{ {entry} }}")
         for name in self.missing:
-            lines.append(f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found")
-            lines.append(f'# {name} = {{ column = "", factor = 1.0 }}')
+            wheels = self.wheels if name == "vx_mps" else ()
+            but = f" but wheels; {_WHEELS}" if wheels else ""
+            column, *others = wheels or ("",)
+            lines.append(
+                f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found{but}"
+            )
+            entry = f"column = {_quoted(column)}, factor = 1.0"
+            entry += f", mean_with = [{', '.join(map(_quoted, others))}]" if others else ""
+            lines.append(f"# {name} = {{ {entry} }}")
         if self.ground:
             lines += [
                 "",
