@@ -115,6 +115,14 @@ ERRORS: dict[str, tuple[Change, list[str]]] = {
     "yaw rate sign": (times(yaw_rate_radps=-1), ["yaw_rate_radps: wrong sign", "factor = -1"]),
     "ay sign": (times(ay_mps2=-1), ["ay_mps2: wrong sign", "t = ", "factor = -1"]),
     "vy sign": (times(vy_mps=-1), ["vy_mps: wrong sign", "t = ", "factor = -1"]),
+    "z down but for the steering": (
+        times(yaw_rate_radps=-1, ay_mps2=-1, vy_mps=-1),
+        ["steer_rad: wrong sign", "-1 for it in", "for yaw_rate_radps, ay_mps2 and vy_mps instead"],
+    ),
+    "z down but for a sensor of v_y": (
+        times(steer_rad=-1, yaw_rate_radps=-1, ay_mps2=-1),
+        ["vy_mps: wrong sign", "or for yaw_rate_radps, ay_mps2 and steer_rad instead", "SAE J670"],
+    ),
     "ax sign": (times(ax_mps2=-1), ["ax_mps2: wrong sign", "t = ", "factor = -1"]),
     "fx sign": (times(fx_n=-1), ["fx_n: wrong sign", "t = ", "factor = -1"]),
     "vx sign": (times(vx_mps=-1), ["vx_mps: wrong sign", "t = ", "factor = -1"]),

@@ -80,6 +80,16 @@ def test_turns_of_the_wheels_are_no_speed(
     np.testing.assert_allclose(log["vx_mps"], right["vx_mps"])
 
 
+def test_a_proposal_says_how_axes_with_z_down_are_mapped(right: sv.Log) -> None:
+    """A log of which all lateral channels are turned round is that of a car in a mirror."""
+    turned = ("yaw_rate_radps", "ay_mps2", "vy_mps", "steer_rad")
+    sae = {c: (-1.0 if c in turned else 1.0) * right[c] for c in right.channels}
+    text = sv.propose_channels(sae).to_toml()
+    assert f"turn round the factors of {', '.join(turned)} together" in text
+    found = {c: {"column": c, "factor": -1.0 if c in turned else 1.0} for c in right.channels}
+    np.testing.assert_array_equal(sv.read_log(sae, found)["ay_mps2"], right["ay_mps2"])
+
+
 def test_pressures_of_wheels_are_no_hint(rolling: Columns) -> None:
     others = {n.replace("WhlSpd", "p_tyre").split(" [")[0]: x for n, x in rolling.items()}
     assert "nothing was found but" not in sv.propose_channels(others).to_toml()

@@ -19,6 +19,7 @@ CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
 # Scale errors of good sensors, gravity through roll, and geometry that is not known.
 SCALE_STD = 0.12
 LINEAR_MPS2 = 5.0  # lateral acceleration up to which tyres are nearly linear
+LATERAL = ("yaw_rate_radps", "ay_mps2", "vy_mps", "steer_rad")
 OFFSET = 0.3  # of the steering angle, as a share of its size
 
 _NOT_ONE = 5.0  # deviations from the right unit before another is looked for
@@ -131,10 +132,17 @@ def cosine(x: FloatArray, y: FloatArray) -> float:
 
 def wrong_sign(channel: str, what: str, values: FloatArray, drive: Drive) -> Implausible:
     """What is said of a channel with the opposite sign."""
+    others = [name for name in LATERAL if name in drive.motion.channels and name != channel]
+    mirrored = ""
+    if channel in LATERAL:  # a log of which all are turned round is that of a car in a mirror
+        mirrored = (
+            f", or for {', '.join(others[:-1])} and {others[-1]} instead if these are positive to "
+            f"the right (axes with z down, SAE J670)"
+        )
     return Implausible(
         channel,
-        f"{channel}: wrong sign: it {what}, {drive.place(values)} "
-        f"(ISO 8855: x forward, y and yaw to the left); put factor = -1 in the channel map",
+        f"{channel}: wrong sign: it {what}, {drive.place(values)} (ISO 8855: x forward, y and yaw "
+        f"to the left); put factor = -1 for it in the channel map{mirrored}",
     )
 
 

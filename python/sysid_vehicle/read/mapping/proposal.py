@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from ...errors import InvalidInput
 from ...log import CHANNELS, listed
+from ...log.laws.laws import LATERAL
 from .channel_map import ChannelMap
 from .ground import PARTS, Ground
 from .source import Source
@@ -80,7 +81,14 @@ class Proposal:
 
     def to_toml(self) -> str:
         """The map as a file to look through and to edit."""
-        lines = ["# Proposed channel map: look at every line, mend what is wrong.", "[channels]"]
+        lines = ["# Proposed channel map: look at every line, mend what is wrong."]
+        turned = [c for c in LATERAL if c in self.channels]
+        if not self.ground and len(turned) > 1:
+            lines.append(
+                "# Nothing tells left from right: of a log in axes with z down (SAE J670: y and "
+                f"yaw to the right) turn round the factors of {listed(turned)} together."
+            )
+        lines.append("[channels]")
         for channel, p in self.channels.items():
             lines.append(f"# {CHANNELS[channel].meaning} [{CHANNELS[channel].unit}]: {p.why}")
             if p.others:
