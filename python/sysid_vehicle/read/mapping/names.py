@@ -44,6 +44,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"yaw ?rate|yaw ?vel\w*|gier ?(rate|geschw\w*)",
         r"angular velocity z$|gyro\w* (z|yaw)|twist angular z$|psi ?(p|dot|rate)$",
         r"^(w|omega|rate|gyro|ang vel) ?z$|\bgyro z\b|\byaw\b.*\b(dps|radps|degps)\b",
+        r"\bz (rate of rotation|rotation rate)$",
         r"\b(ang\w*|rotation) rate (z|down)$|\brate (body|hor) z$|\bheading rate$|^r$|^d ?psi$",
         r"^(imu|ins|body) (g|w|omega|gyr|rate) ?z$|^gyr ?z$",
         r"\b(lacet|imbardata|guinada)\b|^gier|girhastighet|ヨーレート|横摆角速度",

@@ -93,6 +93,9 @@ def propose_channels(
             for channel in CHANNELS
             if not (channel == "time_s" and view.has_times) and (found := ranked(view, channel))
         }
+        if "time_s" in chosen:  # a clock of whole seconds repeats between samples
+            steady = {*view.rising}
+            chosen["time_s"].sort(key=lambda name: name not in steady)
         if "time_s" not in chosen and not view.has_times:
             rising = view.stamps or [
                 name for name in view.rising if not any(name in c for c in chosen.values())
