@@ -166,6 +166,25 @@ def test_of_several_clocks_the_one_that_rises_is_taken(tmp_path: Path, log: sv.L
     assert (told.column, told.others) == ("Device Time", ("GPS Time",))
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("velocity", "YawRate", "Longacc", "Latacc", "Steering_Angle"),  # VBOX
+        ("FzgGeschw", "GierRate", "LaengsBeschl", "QuerBeschl", "LenkradWinkel"),
+        ("VehV_v", "YawRate", "LongAcc", "LatAcc", "StrWhlAng"),
+        ("u", "r", "ax", "ay", "delta"),
+    ],
+)
+def test_names_of_loggers(log: sv.Log, names: tuple[str, ...]) -> None:
+    channels = ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2", "steer_rad")
+    columns = {n: log[c] for n, c in zip(names, channels, strict=True)}
+    found = sv.propose_channels({"t": log["time_s"], **columns, "v": log["vy_mps"]})
+    told = {c: found.channels[c].column for c in channels}
+    assert told == dict(zip(channels, names, strict=True))
+    if "u" in names:
+        assert found.channels["vy_mps"].column == "v"
+
+
 def test_a_phone_that_logs_as_racechrono_does(tmp_path: Path, log: sv.Log) -> None:
     """Unix time, and rates of rotation."""
     names = ("timestamp", "speed", "x_acc", "y_acc", "z_rate_of_rotation", "steering_angle")

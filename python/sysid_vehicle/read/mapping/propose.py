@@ -93,6 +93,8 @@ def propose_channels(
             for channel in CHANNELS
             if not (channel == "time_s" and view.has_times) and (found := ranked(view, channel))
         }
+        if {"u", "v"} <= {*view.names}:  # in textbooks speeds along and across
+            chosen |= {"vx_mps": ["u"], "vy_mps": ["v"]}
         if "time_s" in chosen:  # a clock of whole seconds repeats between samples
             steady = {*view.rising}
             chosen["time_s"].sort(key=lambda name: name not in steady)
