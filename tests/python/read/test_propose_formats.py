@@ -185,6 +185,24 @@ def test_names_of_loggers(log: sv.Log, names: tuple[str, ...]) -> None:
         assert found.channels["vy_mps"].column == "v"
 
 
+@pytest.mark.parametrize("labelled", [True, False])
+def test_what_simulink_leaves_in_the_workspace(tmp_path: Path, log: sv.Log, labelled: bool) -> None:
+    """A structure with time for each signal, called like it or without a label."""
+    from scipy.io import savemat
+
+    names = {"vx": "vx_mps", "yaw_rate": "yaw_rate_radps", "ay": "ay_mps2", "ax": "ax_mps2",
+             "steer": "steer_rad"}  # fmt: skip
+    held = {
+        n: {"time": log["time_s"], "signals": {"values": log[c], "label": n if labelled else ""}}
+        for n, c in names.items()
+    }
+    savemat(tmp_path / "out.mat", held)
+    found = sv.propose_channels(tmp_path / "out.mat")
+    assert {p.column: c for c, p in found.channels.items() if c in names.values()} == names
+    read = sv.read_log(tmp_path / "out.mat", found.channel_map)
+    np.testing.assert_allclose(read["ay_mps2"], log["ay_mps2"])
+
+
 def test_a_phone_that_logs_as_racechrono_does(tmp_path: Path, log: sv.Log) -> None:
     """Unix time, and rates of rotation."""
     names = ("timestamp", "speed", "x_acc", "y_acc", "z_rate_of_rotation", "steering_angle")
