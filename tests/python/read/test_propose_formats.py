@@ -173,12 +173,15 @@ def test_of_several_clocks_the_one_that_rises_is_taken(tmp_path: Path, log: sv.L
         ("FzgGeschw", "GierRate", "LaengsBeschl", "QuerBeschl", "LenkradWinkel"),
         ("VehV_v", "YawRate", "LongAcc", "LatAcc", "StrWhlAng"),
         ("u", "r", "ax", "ay", "delta"),
+        ("run(1).vx", "run(1).r", "run(1).ax", "run(1).ay", "run(1).delta"),
+        ("Car.vx", "IMU2.yaw_rate", "IMU2.ax", "IMU2.ay", "Column.swa"),
     ],
 )
 def test_names_of_loggers(log: sv.Log, names: tuple[str, ...]) -> None:
     channels = ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2", "steer_rad")
     columns = {n: log[c] for n, c in zip(names, channels, strict=True)}
-    found = sv.propose_channels({"t": log["time_s"], **columns, "v": log["vy_mps"]})
+    columns |= {"v": log["vy_mps"]} if "u" in names else {}
+    found = sv.propose_channels({"t": log["time_s"], **columns})
     told = {c: found.channels[c].column for c in channels}
     assert told == dict(zip(channels, names, strict=True))
     if "u" in names:

@@ -173,6 +173,9 @@ def rank(name: str, unit: str, channel: str) -> float:
         ),
         default=0.0,
     )
+    last = words(name.rpartition(".")[2])
+    if score == 0.0 and last != text:  # of a struct, a message or a sensor: after all others
+        score = 0.5 * any(re.search(p, last) for p in patterns)
     fits = plain(unit) in FACTORS[si_unit(channel, name)]
     if score == 0.0 and fits and channel in _IN_ITS_UNIT:
         score = float(re.search(_IN_ITS_UNIT[channel], forms[2]) is not None)
