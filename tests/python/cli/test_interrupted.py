@@ -66,13 +66,12 @@ def started(command: list[str], verbose: bool) -> "subprocess.Popen[str]":
     )
 
 
-def ended(process: "subprocess.Popen[str]") -> tuple[int, str, list[str]]:
+def ended(process: "subprocess.Popen[str]") -> tuple[int, str, str]:
     """Status, what was printed, and the last line of the error stream; no traceback is in it."""
     out, err = process.communicate(timeout=120)
     assert "Traceback" not in err
     assert "Exception ignored" not in err
-    lines = [x for x in err.splitlines() if not x.startswith(("import ", "# "))]
-    return process.returncode, out, lines[-1:]
+    return process.returncode, out, err.splitlines()[-1]
 
 
 @pytest.fixture
@@ -89,7 +88,9 @@ def test_while_it_is_loaded(start: Started, module: str, waiting: list[str]) -> 
         assert process.stderr is not None
         assert any(f"import '{module}" in line for line in process.stderr)
         process.send_signal(signal.SIGINT)
-        assert ended(process) == (130, "", ["sysid-vehicle: interrupted"])
+        status, out, last = ended(process)
+    assert (status, out) == (130, "")
+    assert last.endswith("sysid-vehicle: interrupted")  # half a line of imports may stand before
 
 
 @pytest.mark.parametrize("start", [as_module, as_script])
@@ -98,14 +99,14 @@ def test_in_a_command(start: Started, waiting: list[str]) -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         process.send_signal(signal.SIGINT)
-        assert ended(process) == (130, "", ["sysid-vehicle: interrupted"])
+        assert ended(process) == (130, "", "sysid-vehicle: interrupted")
 
 
 @pytest.mark.parametrize("swallows", [SWALLOWS, SHOWN])
 def test_where_it_is_swallowed(swallows: str, tmp_path: Path) -> None:
     (tmp_path / "e.py").write_text(swallows + WAITS)
     with as_module("effects", "--define", str(tmp_path / "e.py")) as process:
-        assert ended(process) == (130, "ready\n", ["sysid-vehicle: interrupted"])
+        assert ended(process) == (130, "ready\n", "sysid-vehicle: interrupted")
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.1, 0.5])
@@ -116,7 +117,7 @@ def test_a_study_says_so_and_writes_nothing(tmp_path: Path, lap: sv.Log, seconds
     given = ["diagnose", str(tmp_path / "lap.csv"), "--vehicle", str(tmp_path / "car.toml")]
     given += ["--json", str(tmp_path / "out.json"), "--define", str(tmp_path / "e.py")]
     with as_module(*given) as process:
-        status, out, (last,) = ended(process)
+        status, out, last = ended(process)
     assert (status, out) == (130, "")
     assert last.startswith("sysid-vehicle: interrupted")
     assert {p.name for p in tmp_path.iterdir()} == {"car.toml", "lap.csv", "e.py"}
