@@ -4,6 +4,9 @@ Compare a single-track model with what was measured, see where it fails, learn w
 is missing, add it, and watch the error fall on validation data.
 """
 
+from ._common import starting as _starting  # noqa: F401  first: the others take a while
+
+# isort: split
 from . import manoeuvres
 from ._core import __version__
 from .compare import Comparison, compare

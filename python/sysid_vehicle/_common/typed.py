@@ -14,7 +14,8 @@ import inspect
 import os
 import types
 import typing
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar, Union
 
@@ -57,6 +58,18 @@ def typed(function: Callable[P, R]) -> Callable[P, R]:
             raise
 
     return checked
+
+
+@contextmanager
+def blaming(function: Callable[..., Any], given: Mapping[str, Any]) -> Iterator[None]:
+    """Do the same for arguments of a function that are looked at before it is called."""
+    try:
+        yield
+    except SysidError:
+        raise
+    except _RAW as error:
+        _blame(function, given, inspect.signature(function), error)
+        raise
 
 
 def _blame(

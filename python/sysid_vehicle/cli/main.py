@@ -10,6 +10,7 @@ from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdo
 from typing import Any, TextIO
 
 from .._common.progress import note
+from .._common.starting import INTERRUPTED, ending, interruptible
 from .._common.text import columns, wrapped
 from ..errors import Interrupted, SysidError
 from .commands import COMMANDS
@@ -17,7 +18,6 @@ from .outputs import refuse_outputs
 from .parser import parse
 
 _FAILED = 2
-_INTERRUPTED = 130  # what shells report for Ctrl-C
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -34,18 +34,20 @@ def main(argv: list[str] | None = None) -> int:
         Exit status: 0, 2 for input that cannot be used, 130 after Ctrl-C.
     """
     try:
-        args = parse(argv)
-        with _warnings_as_lines() as heard, _read_to_the_end_or_not(args.command):
-            refuse_outputs(args)
-            COMMANDS[args.command](args, heard)
-            sys.stdout.flush()
+        with interruptible():
+            args = parse(argv)
+            with _warnings_as_lines() as heard, _read_to_the_end_or_not(args.command):
+                refuse_outputs(args)
+                COMMANDS[args.command](args, heard)
+                sys.stdout.flush()
     except (SysidError, OSError) as error:
         print(f"sysid-vehicle: error: {_one_line(str(error))}", file=sys.stderr)
         return _FAILED
     except KeyboardInterrupt as interrupt:
+        ending()
         known = f" {interrupt}" if isinstance(interrupt, Interrupted) else ""
         print(f"sysid-vehicle: interrupted{known}", file=sys.stderr)
-        return _INTERRUPTED
+        return INTERRUPTED
     return 0
 
 

@@ -17,12 +17,12 @@ from .._common.threads import cores
 from .._common.typed import typed
 from ..errors import SysidError, warn
 from ..read import ChannelMap
-from .jobs import Car, Drive, Job, check_options, jobs_of
+from .jobs import Car, Drive, Job, check_asked, check_options, jobs_of
 from .page import fleet_page
 from .pool import process_pool
 from .results import Fleet, Row
 from .store import Store
-from .work import Outcome, do, failed
+from .work import Outcome, define, do, failed
 
 _SUMMARY_EVERY_S = 2.0
 
@@ -67,7 +67,7 @@ def improve_many(
     dbc : str or Path, optional
         As for `read_log`, for all files.
     define : sequence of path
-        Python files that define effects; each process runs them.
+        Python files that define effects; this process and each other one run them.
     retry : bool
         Whether to try again what failed in an earlier run.
     tell : callable, optional
@@ -122,6 +122,8 @@ def run(
     count = cores() if workers is None else whole(workers, "workers", 1)
     if executor is not None and not callable(getattr(executor, "submit", None)):
         expect(executor, Executor, "improve_many")
+    define(dict.fromkeys(path for job in jobs for path in job.define), again=True)
+    check_asked(jobs)
     store = Store(out)
     say = tell if tell is not None else _silent
     digests = {job.name: job.digest() for job in jobs}

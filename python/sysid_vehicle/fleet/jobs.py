@@ -10,12 +10,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from .._common.files import as_path, refuse_unknown
+from .._common.typed import blaming
 from ..errors import InvalidInput
 from ..log import Log
 from ..model import Model
 from ..read import ChannelMap
 from ..saved import fingerprint
-from ..study import improve
+from ..study import asked, improve
 from ..vehicle import Vehicle
 
 Car = Vehicle | Model | str | Path
@@ -185,6 +186,25 @@ def check_options(options: Options, where: str) -> None:
             f"{where}: sensors: each study checks the sensors of its own logs; give False to leave "
             f"logs as they are"
         )
+
+
+def check_asked(jobs: Iterable[Job]) -> None:
+    """Refuse values of options that `improve` refuses whatever the log; effects are defined by now.
+
+    Raises
+    ------
+    InvalidInput
+        As `improve` says it.
+    """
+    usual = {name: p.default for name, p in signature(improve).parameters.items()}
+    for job in jobs:
+        given = {
+            name: job.options.get(name, usual[name])
+            for name in signature(asked).parameters
+            if name != "model"
+        }
+        with blaming(improve, given):
+            asked(job.model, **given)
 
 
 def _named(logs: Sequence[Drive | Sequence[Drive]]) -> dict[str, Drive | Sequence[Drive]]:

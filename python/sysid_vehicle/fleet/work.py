@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -48,7 +49,7 @@ def do(job: Job) -> Outcome:
 def _done(job: Job) -> Outcome:
     began = time.perf_counter()
     try:
-        _define(job.define)
+        define(job.define)
         # Other studies have the other cores.
         with at_most(1):
             train, validation = (_logs(job, drives) for drives in (job.train, job.validation))
@@ -68,10 +69,11 @@ def failed(job: Job, because: str, seconds: float = 0.0) -> Outcome:
     return Outcome(Row(job.name, job.car, failure=because or "unknown", seconds=seconds), None)
 
 
-def _define(files: tuple[Path, ...]) -> None:
+def define(files: Iterable[Path], *, again: bool = False) -> None:
+    """Run files that define effects, those that this process has run only if asked."""
     with _defining:
         for path in files:
-            if path not in _defined:
+            if again or path not in _defined:
                 load_effects(path)
                 _defined.add(path)
 

@@ -15,6 +15,24 @@ _STAMP = re.compile(
     r"(\d\d?:\d\d:\d\d(?:[.,]\d+|:\d{3})?) ?([AP]M)? ?(Z|[+-]\d\d:?\d\d)?",
     re.I,
 )
+# Months by name, in English and German: 28-Nov-2026 10:59:59.5, Sat Nov 28 10:59:59 GMT+01:00 2026.
+_ENGLISH = "jan feb mar apr may jun jul aug sep oct nov dec"
+_MONTHS = {
+    **{name: 1 + k for k, name in enumerate(_ENGLISH.split())},
+    "jän": 1,
+    "mär": 3,
+    "mrz": 3,
+    "mai": 5,
+    "okt": 10,
+    "dez": 12,
+}
+_NAMED = rf"({'|'.join(_MONTHS)})[a-z]*\.?"
+_DAY_FIRST = re.compile(rf"(\d\d?)[.\- /]+{_NAMED}[\- /]+(\d{{4}})[ ,T]+(.*)", re.I)
+_YEAR_FIRST = re.compile(r"(\d{4})[/.](\d\d?)[/.](\d\d?)[ T](.*)")
+_AS_UNIX = re.compile(
+    rf"(?:[a-z]{{3}},? )?{_NAMED} +(\d\d?) (\S+)(?: (?:[a-z]*([+-]\d\d:?\d\d)|[a-z]+))? (\d{{4}})",
+    re.I,
+)
 _MINUTES = re.compile(r"(\d+):(\d\d[.,]\d+)")  # of a lap, or how spreadsheets show a time of day
 _DAY_S, _HOUR_S, _WEEK_S = 86400.0, 3600.0, 604800.0
 _TURN_S = 1.0  # readings on both sides of the end of a day or a week are nearer to it
@@ -55,8 +73,9 @@ def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
     """Return dates with time, times of day, or minutes and seconds, as seconds since the first.
 
     Dates are those of ISO 8601 or have the year last; of these, ``05/03/2026``, the order of day
-    and month is the one in which less time passes. Times of day are counted on where the day ends,
-    minutes where the hour ends. None if a cell is none of them, or if they are not all alike.
+    and month is the one in which less time passes. Months may be names. Times of day are counted on
+    where the day ends, minutes where the hour ends. None if a cell is none of them, or if they are
+    not all alike.
 
     Parameters
     ----------
@@ -72,7 +91,7 @@ def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
             stamps.append("NaT")
             zones.append("")
             continue
-        match = _STAMP.fullmatch(text)
+        match = _STAMP.fullmatch(text) or _STAMP.fullmatch(_with_numbers(text))
         if match is None:
             return None
         day, clock, half, zone = match.groups()
@@ -88,6 +107,21 @@ def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
     if dated == {True}:
         known = [_counted_on(times, _DAY_S) for times in known]
     return min(known, key=lambda times: float(np.nanmax(times) - np.nanmin(times)), default=None)
+
+
+def _with_numbers(text: str) -> str:
+    """A stamp whose month is a name, or that begins with the year, with its date as ISO 8601."""
+    if found := _YEAR_FIRST.fullmatch(text):
+        year, number, day, rest = found.groups()
+        return f"{year}-{int(number):02d}-{int(day):02d} {rest}"
+    if found := _DAY_FIRST.fullmatch(text):
+        day, month, year, rest = found.groups()
+    elif found := _AS_UNIX.fullmatch(text):
+        month, day, clock, zone, year = found.groups()
+        rest = clock + (zone or "")
+    else:
+        return text
+    return f"{year}-{_MONTHS[month.lower()]:02d}-{int(day):02d} {rest}"
 
 
 def _of_day(clock: str, half: str | None) -> str:

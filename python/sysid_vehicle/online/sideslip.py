@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..estimate.inputs import white_noise_std
 from ..log import Log
 from ..tyre import Tyre
 from ..vehicle import Vehicle, vehicle_data
-from .sideslip_results import SideslipRun, judged_by
+from .sideslip_results import SideslipRun, judged, judged_by
 from .sideslip_settings import NOISE_BLOCK, SideslipSettings
 
 #: Kinds of observers, with what each is.
@@ -70,6 +71,9 @@ class SideslipObserver:
         The defaults if left out.
     kind : str
         One of :data:`KINDS`.
+    judge : bool
+        Whether a dual observer runs beside one of another kind and judges its band, as in
+        :func:`estimate_sideslip`: a step then takes as long as both.
 
     Notes
     -----
@@ -88,7 +92,7 @@ class SideslipObserver:
     2017).
 
     The standard deviation of the other kinds takes the tyres of the vehicle file as exact; with
-    other tyres, or on another surface, it is far too small. `estimate_sideslip` judges it.
+    other tyres, or on another surface, it is far too small, unless it is judged.
 
     Readings that no car gives, by their size or by how fast they change, are refused: the tyre
     model stands in, and `mode` says so. Steps beyond 0.01 s are divided. After a step of more than
@@ -104,21 +108,36 @@ class SideslipObserver:
         vehicle: Vehicle,
         settings: SideslipSettings | None = None,
         kind: str = "dual",
+        *,
+        judge: bool = False,
     ) -> None:
         values = dict(settings if settings is not None else SideslipSettings())
-        self.vehicle, self.kind = vehicle, kind
         car = observed_car(vehicle)
-        self._core: _core._SideslipObserver
+        core: _core._SideslipObserver
         if kind == "dual":
-            self._core = _core.SideslipDual(car, values)
+            core = _core.SideslipDual(car, values)
         elif kind == "ekf":
-            self._core = _core.SideslipEkf(car, values, False)
+            core = _core.SideslipEkf(car, values, False)
         elif kind == "square-root-ukf":
-            self._core = _core.SideslipSquareRootUkf(car, values, False)
+            core = _core.SideslipSquareRootUkf(car, values, False)
         elif kind in ("ukf", "linear-ukf"):
-            self._core = _core.SideslipUkf(car, values, kind == "linear-ukf")
+            core = _core.SideslipUkf(car, values, kind == "linear-ukf")
         else:
             raise InvalidInput(f"kind: '{kind}' is not known; give one of {', '.join(KINDS)}")
+        beside = _core.SideslipDual(car, values) if judge and kind != "dual" else None
+        self._begin(vehicle, kind, core, beside)
+
+    def _begin(
+        self,
+        vehicle: Vehicle,
+        kind: str,
+        core: _core._SideslipObserver,
+        dual: _core.SideslipDual | None = None,
+    ) -> None:
+        self.vehicle, self.kind = vehicle, kind
+        self._core, self._dual = core, dual
+        self._refuted = 0
+        self._turn = threading.Lock()  # a dual observer beside takes the same samples
 
     @typed
     def step(
@@ -138,9 +157,14 @@ class SideslipObserver:
             If a reading is infinite, the time step is not positive, or the filter leaves the range
             of numbers; the message gives the sample.
         """
-        return SideslipEstimate._make(
-            self._core.step(dt_s, steer_rad, vx_mps, yaw_rate_radps, ax_mps2, ay_mps2)
-        )
+        sample = dt_s, steer_rad, vx_mps, yaw_rate_radps, ax_mps2, ay_mps2
+        if self._dual is None:
+            return SideslipEstimate._make(self._core.step(*sample))
+        with self._turn:
+            own, dual = SideslipEstimate._make(self._core.step(*sample)), self._dual.step(*sample)
+            std, refuted = judged(own.beta_rad, own.beta_std_rad, dual[0], dual[1])
+            self._refuted += bool(refuted)
+        return own._replace(beta_std_rad=float(std))
 
     @typed
     def run(self, dt_s: FloatArray, sensors: FloatArray) -> FloatArray:
@@ -165,13 +189,36 @@ class SideslipObserver:
             )
         if dt_s.shape != (len(sensors),):
             raise InvalidInput(f"dt_s: shape {dt_s.shape}; give ({len(sensors)},), as sensors")
-        return self._core.run(dt_s, sensors)
+        if self._dual is None:
+            return self._core.run(dt_s, sensors)
+        with self._turn:
+            own, dual = self._core.run(dt_s, sensors), self._dual.run(dt_s, sensors)
+            own[:, 1], refuted = judged(*own[:, :2].T, *dual[:, :2].T)
+            self._refuted += int(np.count_nonzero(refuted))
+        return own
 
     def copy(self) -> SideslipObserver:
         """An independent observer in the same state."""
         other = object.__new__(type(self))
-        other.vehicle, other.kind, other._core = self.vehicle, self.kind, self._core.copy()
+        with self._turn:
+            dual = None if self._dual is None else self._dual.copy()
+            other.__setstate__({**self.__getstate__(), "_core": self._core.copy(), "_dual": dual})
         return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_turn"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _turn=threading.Lock())
+
+    @property
+    def refuted(self) -> float:
+        """Share of samples in which the dual observer refutes the estimate; NaN without one.
+
+        Both are further apart than both bands allow: where that is more than one in twenty, the
+        tyres of the vehicle file do not fit.
+        """
+        return self._refuted / self.samples if self._dual is not None and self.samples else np.nan
 
     @property
     def samples(self) -> int:

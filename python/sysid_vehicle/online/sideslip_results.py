@@ -280,6 +280,18 @@ class SideslipRun(Told):
         return tidy(ax, xlabel="time [s]", ylabel="cornering stiffness [kN/rad]")
 
 
+def judged(
+    beta: npt.ArrayLike, own_std: npt.ArrayLike, dual: npt.ArrayLike, dual_std: npt.ArrayLike
+) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """The band of an estimate by what the dual observer knows [rad], and where that refutes it.
+
+    By what it knows the error has the mean square of its variance and the squared distance.
+    Refuted is an estimate that is further away than both bands of two standard deviations allow.
+    """
+    apart = np.subtract(beta, dual)
+    return np.hypot(apart, dual_std), np.abs(apart) > 2.0 * np.hypot(own_std, dual_std)
+
+
 def judged_by(run: SideslipRun, dual: SideslipRun) -> SideslipRun:
     """The run with a band by what another one knows, which has learned the tyres.
 
@@ -293,8 +305,7 @@ def judged_by(run: SideslipRun, dual: SideslipRun) -> SideslipRun:
     SysidWarning
         If the two are further apart than both bands allow for longer than chance explains.
     """
-    apart = run.beta_rad - dual.beta_rad
-    refuted = np.abs(apart) > 2.0 * np.hypot(run.beta_std_rad, dual.beta_std_rad)
+    std, refuted = judged(run.beta_rad, run.beta_std_rad, dual.beta_rad, dual.beta_std_rad)
     share = float(np.mean(refuted))
     if share > _BY_CHANCE:
         first = run.time_s[int(np.argmax(refuted))]
@@ -306,7 +317,7 @@ def judged_by(run: SideslipRun, dual: SideslipRun) -> SideslipRun:
         )
     return dataclasses.replace(
         run,
-        beta_std_rad=np.hypot(apart, dual.beta_std_rad),
+        beta_std_rad=std,
         exact_std_rad=run.beta_std_rad,
         refuted=refuted,
     )

@@ -25,8 +25,8 @@ class PublishedSideslipObserver(SideslipObserver):
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        self.vehicle, self.kind = vehicle, "published"
-        self._core = _core.PublishedDual(observed_car(vehicle), *static_stiffness(vehicle))
+        core = _core.PublishedDual(observed_car(vehicle), *static_stiffness(vehicle))
+        self._begin(vehicle, "published", core)
 
 
 def estimate_sideslip(vehicle: Vehicle, log: Log) -> SideslipRun:

@@ -1,7 +1,7 @@
 """Long tables, as data bases of time series export them: a row for each reading.
 
-One column holds the times, one the names of the channels, one the values. Each channel becomes one
-with its own times.
+One column holds the times, one the names of the channels or their numbers, one the values. Each
+channel becomes one with its own times.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from .units import factor_to, unit_at_end, without_unit
 
 _TIMES = ("time", "timestamp", "datetime", "times", "t", "ts", "date", "seconds")
 _NAMES = ("field", "signal", "channel", "name", "variable", "metric", "series", "parameter", "key",
-          "sensor", "measurement", "tag", "topic")  # fmt: skip
+          "sensor", "measurement", "tag", "topic", "id")  # fmt: skip
+_OWNERS = ("device", "node", "source", "host", "car", "vehicle", "bus")
 _VALUES = ("value", "values", "val", "reading", "data")
 _UNITS = ("unit", "units")
 _FEWEST = 2  # readings of a channel, on average
@@ -36,7 +37,8 @@ def recording_of_long(table: Table) -> Recording | None:
 
     A table is long if it has columns for time, name and value that are called so, such as
     ``_time``, ``_field`` and ``_value`` of InfluxDB, or if there are only three and they can be
-    nothing else; and if it has none of the canonical channels.
+    nothing else; and if it has none of the canonical channels. Numbers in place of names, such as
+    the keys of series in a data base, are names as they are written: ``17``.
     """
     if any(name in CHANNELS for name in table.names if name != "time_s"):
         return None
@@ -45,7 +47,7 @@ def recording_of_long(table: Table) -> Recording | None:
         return None
     time, name, value = found
     time_s = _seconds(table, time)
-    labels, ids = np.unique(np.array(table.texts[name], dtype=str), return_inverse=True)
+    labels, ids = np.unique(_words(table, name), return_inverse=True)
     if labels.size * _FEWEST > ids.size:
         return None
     values, not_numbers = _numbers(table, value)
@@ -80,12 +82,27 @@ def _columns(table: Table) -> tuple[str, str, str] | None:
     text = [n for n in table.texts if table.counts[n] == 1]
     numbers = [n for n in table.columns if n and n not in table.seconds and table.counts[n] == 1]
     time = _called(_TIMES, [*table.seconds, *numbers])
-    name = _called(_NAMES, text)
-    value = _called(_VALUES, [*numbers, *(n for n in text if n != name)])
+    name = _called(_NAMES, text) or _called(_NAMES, [n for n in numbers if _counts(table, n)])
+    value = _called(_VALUES, [n for n in (*numbers, *text) if n != name])
     if len([n for n in table.names if n]) == 3 and len(text) == 1 and time:
         others = [n for n in numbers if n != time]
         name, value = text[0], others[0] if len(others) == 1 else value
     return (time, name, value) if time and name and value else None
+
+
+def _counts(table: Table, name: str) -> bool:
+    """Whether a column holds several whole numbers, which come again, and nothing else."""
+    known = table.columns[name][~np.isnan(table.columns[name])]
+    several = np.unique(known).size
+    return bool((known == np.rint(known)).all()) and 1 < several <= known.size / _FEWEST
+
+
+def _words(table: Table, name: str) -> npt.NDArray[np.str_]:
+    """The cells of a column of names or of whole numbers, empty where there is none."""
+    if name in table.texts:
+        return np.array(table.texts[name], dtype=str)
+    several, which = np.unique(table.columns[name], return_inverse=True)
+    return np.array(["" if np.isnan(c) else f"{c:.0f}" for c in several], dtype=str)[which]
 
 
 def _called(words: Sequence[str], names: Sequence[str]) -> str:
@@ -123,10 +140,12 @@ def _numbers(table: Table, value: str) -> tuple[FloatArray, npt.NDArray[np.bool_
 
 
 def _others(table: Table, used: Sequence[str]) -> list[npt.NDArray[np.str_]]:
-    """Text beside the names that tells channels apart, such as the device they are of."""
+    """What tells channels apart beside their names: the device they are of, or its number."""
+    numbers = (n for n in table.columns if n and table.counts[n] == 1 and n not in table.seconds)
+    keys = (n for n in numbers if _called((*_NAMES, *_OWNERS), [n]) and _counts(table, n))
     found = [
-        np.array(cells, dtype=str)
-        for name, cells in table.texts.items()
+        _words(table, name)
+        for name in (*table.texts, *keys)
         if name not in used and _called(_UNITS, [name]) == ""
     ]
     return [cells for cells in found if (cells != cells[0]).any()]

@@ -17,7 +17,7 @@ _POUND = 0.45359237
 # Factor to the SI unit, by that unit and the text in the file as `plain` gives it.
 FACTORS: dict[str, dict[str, float]] = {
     "s": {
-        **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
+        **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "unixtime"), 1.0),
         **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
         **dict.fromkeys(("us", "µs", "μs", "microsecond", "microseconds"), 1e-6),
         **dict.fromkeys(("ns", "nanosecond", "nanoseconds"), 1e-9),

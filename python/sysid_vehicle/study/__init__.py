@@ -3,6 +3,7 @@
 from ..rules import Verdict
 from .ahead.horizons import LATERAL, PREDICTED, Horizons, horizons
 from .ahead.waterfall import Waterfall, look_ahead
+from .asked import asked
 from .improve import improve
 from .next_drive import next_drive
 from .results.added import AddedEffect
@@ -18,6 +19,7 @@ __all__ = [
     "Study",
     "Verdict",
     "Waterfall",
+    "asked",
     "horizons",
     "improve",
     "left_out",

@@ -6,12 +6,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
-from .._common.arguments import duration, whole
 from .._common.progress import teller
 from .._common.threads import before
 from .._common.typed import typed
-from ..diagnose import beside_what_they_refine, considered, refining
-from ..effects import effect
+from ..diagnose import beside_what_they_refine, refining
 from ..estimate import Driving
 from ..identify import explaining
 from ..identify.identify import maximised
@@ -19,8 +17,8 @@ from ..log import Log, several_logs
 from ..model import Model
 from ..rules import USUAL, Rules
 from ..sensors import SensorCheck, made_ready, put_right
+from .asked import asked
 from .judge.judge import Judge
-from .judge.matters import sizes_that_matter
 from .limit import Judging, Schedule
 from .search.clock import in_time
 from .search.search import Search, Trail, kept
@@ -111,20 +109,32 @@ def improve(
 
     Raises
     ------
+    InvalidInput
+        An argument cannot be used; one that does not depend on the logs is refused before any work.
     Interrupted
         After Ctrl-C, with the models so far; a `KeyboardInterrupt`.
     """
-    most_effects = whole(most_effects, "most_effects")
-    rules = rules.at(alpha)
     began = time.perf_counter()
-    schedule = Schedule.of(began, duration(time_limit_s, "time_limit_s"))
+    wants = asked(
+        model,
+        most_effects=most_effects,
+        alpha=alpha,
+        rules=rules,
+        candidates=candidates,
+        exclude=exclude,
+        time_limit_s=time_limit_s,
+        matters=matters,
+        starts=starts,
+        seed=seed,
+    )
+    rules = wants.rules
+    schedule = Schedule.of(began, wants.limit_s)
     judging = Judging(schedule.judging)
-    sizes = None if matters is None else sizes_that_matter(matters)
     train, test, settled, checked = _ready(train, test, sensors, schedule.sensors)
     if not checked:
         judging.left_out.append(_CHANNELS)
-    left_out = {effect(e).id for e in (*exclude, *settled)}
-    wanted = tuple(e for e in considered(model, candidates) if e.id not in left_out)
+    left_out = {*wants.excluded, *settled}
+    wanted = tuple(e for e in wants.wanted if e.id not in left_out)
     others = {*left_out, *(e.id for e in wanted)}
     finer = tuple(e for e in refining() if e.id not in others) if candidates is None else ()
     if sensors:
@@ -149,7 +159,7 @@ def improve(
                 test_driving,
                 candidates=wanted,
                 finer=finer,
-                most_effects=len(model.effects) + min(most_effects, room),
+                most_effects=len(model.effects) + min(wants.most_effects, room),
                 ends=schedule.search,
                 judged_by=schedule.step,
                 rules=rules,
@@ -185,7 +195,7 @@ def improve(
         asks=judging,
         rules=rules,
         lacked=[e.id for e in (*wanted, *beside_what_they_refine(finer, found.fit.model))],
-        sizes=sizes,
+        sizes=wants.sizes,
         seed=seed,
         settled=settled,
     )

@@ -12,23 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from side_wind import side_wind
 
 import sysid_vehicle as sv
 from sysid_vehicle.cli import main
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals, devices and limits")
 
-EFFECT = """
-import pathlib
-from sysid_vehicle import define_effect, parameter
-pathlib.Path(__file__).with_suffix(".ran").touch()
-define_effect(
-    "of_a_file",
-    title="side wind",
-    parameters=[parameter("gain", "N", typical=100.0, lower=-1e3, upper=1e3)],
-    force_y=lambda d, p: p.gain + 0.0 * d.v_x,
-)
-"""
+RAN = 'import pathlib\npathlib.Path(__file__).with_suffix(".ran").touch()'
 
 
 @pytest.fixture
@@ -42,7 +33,7 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def effect_file(tmp_path: Path) -> Iterator[Path]:
-    (tmp_path / "e.py").write_text(EFFECT)
+    (tmp_path / "e.py").write_text(side_wind("of_a_file", RAN))
     yield tmp_path / "e.py"
     if any(e.id == "of_a_file" for e in sv.catalogue()):
         sv.forget_effect("of_a_file")
@@ -104,7 +95,7 @@ def test_the_users_source_is_no_output(
         capsys, command, log, "--vehicle", car, "--define", source, "--json", source, *more
     )
     assert f"{source}: is also an input of this command" in told
-    assert effect_file.read_text() == EFFECT
+    assert effect_file.read_text() == side_wind("of_a_file", RAN)
     assert not effect_file.with_suffix(".ran").exists()  # refused before it was run
 
 
@@ -176,35 +167,3 @@ def test_killed_commands_leave_whole_files(data: Path) -> None:
         assert all(name.startswith(".sysid-") for name in left)
     assert main(given) == 0
     assert {p.name for p in folder.iterdir()} == {"data.csv", "out.json", "out.svg"}
-
-
-_ONCE = """
-import signal
-signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
-import sys
-from sysid_vehicle.cli import main
-print("ready", flush=True)
-sys.exit(main(sys.argv[1:]))
-"""
-
-
-def test_an_interrupted_command_says_so_and_writes_nothing(tmp_path: Path, lap: sv.Log) -> None:
-    sv.example_vehicle().to_toml(tmp_path / "car.toml")
-    lap.to_csv(tmp_path / "lap.csv")
-    out = tmp_path / "out.json"
-    given = ["diagnose", str(tmp_path / "lap.csv"), "--vehicle", str(tmp_path / "car.toml")]
-    with subprocess.Popen(
-        [sys.executable, "-c", _ONCE, *given, "--json", str(out)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
-        told, err = process.communicate(timeout=60)
-    assert (process.returncode, told) == (130, "")
-    assert err.splitlines()[-1].startswith("sysid-vehicle: interrupted")
-    assert "Traceback" not in err
-    assert {p.name for p in tmp_path.iterdir()} == {"car.toml", "lap.csv"}

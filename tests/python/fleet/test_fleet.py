@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from side_wind import side_wind
 
 import sysid_vehicle as sv
 from sysid_vehicle._common import memo as _memo
@@ -272,12 +273,17 @@ def test_processes_and_the_command_line_find_the_same(
 @pytest.mark.manual
 def test_a_process_that_is_killed_costs_its_study_alone(garage: Path, tmp_path: Path) -> None:
     killer = tmp_path / "killer.py"
-    killer.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n")
+    kills = "if mp.parent_process() is not None: os.kill(os.getpid(), signal.SIGKILL)"
+    also = f"import multiprocessing as mp, os, signal\n{kills}\n"
+    killer.write_text(side_wind("of_a_killer", also))
     jobs = [
         replace(job, define=(killer,)) if "bad" in job.name else job
         for job in manifest_jobs(garage / "fleet.toml")
     ]
-    found = run(jobs, tmp_path / "out", workers=2)
+    try:
+        found = run(jobs, tmp_path / "out", workers=2)
+    finally:
+        sv.forget_effect("of_a_killer")
     assert [bool(r.failure) for r in found.rows] == [False, False, True, False]
     assert "was killed twice" in found.failed[0].failure
 

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from side_wind import side_wind
 
 import sysid_vehicle as sv
 from sysid_vehicle.cli import main
@@ -39,6 +40,18 @@ def garage(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ({"logs": {"x": "x.csv"}, "validation": {"y": "y.csv"}}, "unknown key 'y'"),
         ({"logs": {"x": "x.csv"}, "cars": {"y": sv.example_vehicle()}}, "no car is given"),
         ({"logs": ["x.csv"], "workers": 0}, "workers = 0"),
+        ({"logs": ["x.csv"], "candidates": ["aero_darg"]}, "'aero_darg' .did you mean 'aero_drag'"),
+        ({"logs": ["x.csv"], "exclude": ["aero_darg"]}, "'aero_darg' .did you mean 'aero_drag'"),
+        ({"logs": ["x.csv"], "exclude": "aero_drag"}, r"exclude = 'aero_drag': give a list"),
+        ({"logs": ["x.csv"], "candidates": 3}, r"improve: candidates = 3 \(int\); give a list"),
+        ({"logs": ["x.csv"], "matters": {"yaw": 1.0}}, "matters: 'yaw' is no channel"),
+        ({"logs": ["x.csv"], "alpha": 2.0}, "alpha = 2.0: give a number between 0 and 1"),
+        ({"logs": ["x.csv"], "rules": {"alpha": 0.1}}, "improve: rules = .*give a Rules"),
+        ({"logs": ["x.csv"], "seed": "one"}, "seed = 'one': give a whole number"),
+        ({"logs": ["x.csv"], "starts": 0}, "starts = 0: give a whole number, 1 or more"),
+        ({"logs": ["x.csv"], "most_effects": -1}, "most_effects = -1"),
+        ({"logs": ["x.csv"], "time_limit_s": 0}, "time_limit_s = 0"),
+        ({"logs": ["x.csv"], "define": ["none.py"]}, "none.py"),
     ],
 )
 def test_arguments_are_checked_first(
@@ -47,6 +60,7 @@ def test_arguments_are_checked_first(
     given = {"cars": sv.example_vehicle(), "out": tmp_path / "out", **arguments}
     with pytest.raises((sv.InvalidInput, TypeError), match=message):
         sv.improve_many(**given)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_manifest_may_stand_in_a_folder_named_like_a_pattern(tmp_path: Path) -> None:
@@ -106,6 +120,31 @@ def test_a_manifest_that_makes_no_sense(garage: Path, text: str, message: str) -
     (garage / "wrong.toml").write_text(text)
     with pytest.raises(sv.InvalidInput, match=message):
         manifest_jobs(garage / "wrong.toml")
+
+
+def test_effects_are_named_once_those_of_files_are_known(
+    garage: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A name that nothing defines is refused before any study, with the nearest one of a file."""
+    (garage / "own.py").write_text(side_wind("wind_of_a_fleet"))
+
+    def asked(name: str) -> str:
+        (garage / "own.toml").write_text(
+            'vehicle = "car.toml"\nlogs = "logs/b/bad.csv"\ndefine = "own.py"\n'
+            f'[improve]\ncandidates = ["{name}"]\n'
+        )
+        out = tmp_path / name
+        try:
+            assert main(["improve-many", str(garage / "own.toml"), "--out", str(out)]) == 2
+        finally:
+            sv.forget_effect("wind_of_a_fleet")
+        assert out.exists() == (name == "wind_of_a_fleet")
+        return capsys.readouterr().err.splitlines()[-1]
+
+    assert asked("wind_of_a_flet").startswith(
+        "sysid-vehicle: error: no effect is called 'wind_of_a_flet' (did you mean 'wind_of_a_fleet'"
+    )
+    assert asked("wind_of_a_fleet").endswith("none of the 1 studies could be done")
 
 
 def test_a_fleet_of_which_nothing_could_be_done_is_no_success(

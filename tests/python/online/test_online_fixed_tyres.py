@@ -1,6 +1,7 @@
 """Observers whose tyres are fixed: their band is judged by one that learns the tyres."""
 
 import dataclasses
+import pickle
 import warnings
 
 import numpy as np
@@ -8,7 +9,13 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.errors import SysidWarning
-from sysid_vehicle.online import KINDS, SideslipRun, estimate_sideslip
+from sysid_vehicle.online import (
+    KINDS,
+    SideslipObserver,
+    SideslipRun,
+    SideslipSettings,
+    estimate_sideslip,
+)
 
 FIXED = sorted(set(KINDS) - {"dual"})
 
@@ -68,6 +75,38 @@ def test_other_tyres_than_told_are_seen_and_the_band_holds(
     told = run.to_dict()["series"]
     assert np.mean(told["refuted"]) > 0.05
     assert len(told["exact_std_rad"]) == len(told["beta_std_rad"])
+
+
+@pytest.mark.parametrize("kind", FIXED)
+def test_step_by_step_the_band_is_judged_as_over_a_log(
+    drives: dict[str, sv.Log], kind: str
+) -> None:
+    log = drives["softer"]
+    settings = SideslipSettings.of(log, CAR)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SysidWarning)
+        run = estimate_sideslip(CAR, log, kind=kind, settings=settings)
+    assert run.refuted is not None
+    names = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+    sensors, dt = np.column_stack([log[name] for name in names]), 1.0 / log.rate_hz
+    observer = SideslipObserver(CAR, settings, kind, judge=True)
+    assert np.isnan(observer.refuted)
+    halves = [observer.run(np.full(log.n // 2, dt), sensors[: log.n // 2])]
+    observer = pickle.loads(pickle.dumps(observer)).copy()
+    halves.append(np.array([observer.step(dt, *row) for row in sensors[log.n // 2 :]]))
+    found = np.concatenate(halves)
+    np.testing.assert_array_equal(found[:, 0], run.beta_rad)
+    np.testing.assert_array_equal(found[:, 1], run.beta_std_rad)
+    assert observer.samples == log.n
+    assert observer.refuted == pytest.approx(float(np.mean(run.refuted)), abs=1e-12)
+    assert observer.refuted > 0.05
+
+
+def test_without_another_observer_nothing_is_judged(drives: dict[str, sv.Log]) -> None:
+    plain, judged = SideslipObserver(CAR), SideslipObserver(CAR, judge=True)
+    for observer in (plain, judged, SideslipObserver(CAR, kind="ukf")):
+        assert observer.step(0.01, 0.02, 20.0, 0.11, 0.0, 2.3).beta_std_rad > 0.0
+        assert np.isnan(observer.refuted)
 
 
 @pytest.mark.parametrize("kind", ["ukf", "linear-ukf"])

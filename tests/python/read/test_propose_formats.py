@@ -1,6 +1,7 @@
 """Raw logs of loggers are read with the channel map that is proposed for them."""
 
 import json
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -141,6 +142,91 @@ def test_a_column_that_is_filled_with_one_number(log: sv.Log, channel: str, fill
 def test_a_car_that_stands(log: sv.Log) -> None:
     columns = {c: np.zeros(log.n) for c in log.channels} | {"time_s": log["time_s"]}
     assert set(sv.propose_channels(columns).channels) == set(log.channels)
+
+
+def test_of_several_clocks_the_one_that_rises_is_taken(tmp_path: Path, log: sv.Log) -> None:
+    """As Torque writes them: the clock of the satellites in whole seconds."""
+    names = [
+        "GPS Time",
+        "Device Time",
+        "Speed (OBD)(km/h)",
+        "Yaw rate(deg/s)",
+        "Lateral accel(m/s2)",
+    ]
+    rows = [
+        f"Sat Nov 28 10:00:{int(t):02d} GMT+01:00 2026,28-Nov-2026 10:00:{t:06.3f},"
+        f"{3.6 * v},{r / DEG},{a}"
+        for t, v, r, a in zip(
+            log["time_s"], log["vx_mps"], log["yaw_rate_radps"], log["ay_mps2"], strict=True
+        )
+    ]
+    path = tmp_path / "trackLog.csv"
+    path.write_text("\n".join([", ".join(names), *rows]))
+    told = sv.propose_channels(path).channels["time_s"]
+    assert (told.column, told.others) == ("Device Time", ("GPS Time",))
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("velocity", "YawRate", "Longacc", "Latacc", "Steering_Angle"),  # VBOX
+        ("FzgGeschw", "GierRate", "LaengsBeschl", "QuerBeschl", "LenkradWinkel"),
+        ("VehV_v", "YawRate", "LongAcc", "LatAcc", "StrWhlAng"),
+        ("u", "r", "ax", "ay", "delta"),
+        ("run(1).vx", "run(1).r", "run(1).ax", "run(1).ay", "run(1).delta"),
+        ("Car.vx", "IMU2.yaw_rate", "IMU2.ax", "IMU2.ay", "Column.swa"),
+    ],
+)
+def test_names_of_loggers(log: sv.Log, names: tuple[str, ...]) -> None:
+    channels = ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2", "steer_rad")
+    columns = {n: log[c] for n, c in zip(names, channels, strict=True)}
+    columns |= {"v": log["vy_mps"]} if "u" in names else {}
+    found = sv.propose_channels({"t": log["time_s"], **columns})
+    told = {c: found.channels[c].column for c in channels}
+    assert told == dict(zip(channels, names, strict=True))
+    if "u" in names:
+        assert found.channels["vy_mps"].column == "v"
+
+
+@pytest.mark.parametrize("labelled", [True, False])
+def test_what_simulink_leaves_in_the_workspace(tmp_path: Path, log: sv.Log, labelled: bool) -> None:
+    """A structure with time for each signal, called like it or without a label."""
+    from scipy.io import savemat
+
+    names = {"vx": "vx_mps", "yaw_rate": "yaw_rate_radps", "ay": "ay_mps2", "ax": "ax_mps2",
+             "steer": "steer_rad"}  # fmt: skip
+    held = {
+        n: {"time": log["time_s"], "signals": {"values": log[c], "label": n if labelled else ""}}
+        for n, c in names.items()
+    }
+    savemat(tmp_path / "out.mat", held)
+    found = sv.propose_channels(tmp_path / "out.mat")
+    assert {p.column: c for c, p in found.channels.items() if c in names.values()} == names
+    read = sv.read_log(tmp_path / "out.mat", found.channel_map)
+    np.testing.assert_allclose(read["ay_mps2"], log["ay_mps2"])
+
+
+def test_a_phone_that_logs_as_racechrono_does(tmp_path: Path, log: sv.Log) -> None:
+    """Unix time, and rates of rotation."""
+    names = ("timestamp", "speed", "x_acc", "y_acc", "z_rate_of_rotation", "steering_angle")
+    columns = [
+        1.7e9 + log["time_s"],
+        log["vx_mps"],
+        log["ax_mps2"] / 9.80665,
+        log["ay_mps2"] / 9.80665,
+        np.degrees(log["yaw_rate_radps"]),
+        np.degrees(log["steer_rad"]),
+    ]
+    rows = [",".join(f"{x:.9f}" for x in row) for row in zip(*columns, strict=True)]
+    units = "unix time,m/s,G,G,deg/s,deg"
+    path = tmp_path / "session.csv"
+    path.write_text("\n".join([",".join(names), units, *rows]))
+    found = sv.propose_channels(path)
+    assert found.channels["yaw_rate_radps"].column == "z_rate_of_rotation"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read = sv.read_log(path, found.channel_map)
+    np.testing.assert_allclose(read["yaw_rate_radps"], log["yaw_rate_radps"], atol=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,16 @@ def test_descriptions_and_types_below_the_names(tmp_path: Path, below: list[list
     check_values(log, slow=(), atol=1e-8)
 
 
+@pytest.mark.parametrize("below", [["End of data"], ["--- end ---", "saved by the logger"]])
+def test_text_below_the_numbers(tmp_path: Path, below: list[str]) -> None:
+    """What a logger writes when it ends, in a row of as many cells."""
+    ends = [[text] + [""] * (len(NAMES) - 1) for text in below]
+    path = written(tmp_path, NAMES, *cells(), *ends)
+    with pytest.warns(SysidWarning, match="at the end holds text and no reading, and was left out"):
+        log = read_log(path, TIMED, check=False)
+    check_values(log, slow=(), atol=1e-8)
+
+
 def test_signals_of_one_name_are_told_by_their_sensors(tmp_path: Path) -> None:
     """As tables with two levels of names are written; an empty cell repeats the one before."""
     names = ["Time", "z", "x", "y", "Steer", "Speed", "x"]

@@ -98,6 +98,36 @@ def test_devices_that_have_fields_of_one_name() -> None:
     np.testing.assert_allclose(log["spare.y"], 0.5 * measured(FAST)["LatAcc"])
 
 
+@pytest.mark.parametrize("called", ["signal_id", "id", "Series", "metricId"])
+@pytest.mark.parametrize("kind", ["file", "memory"])
+def test_numbers_in_place_of_names(tmp_path: Path, called: str, kind: str) -> None:
+    """The keys of series in a data base; a device may be a number as well."""
+    key = {name: k for k, name in enumerate(UNITS, start=17)}
+    time, name, value = zip(*readings(), strict=True)
+    columns: dict[str, Any] = {"time": time, called: [key[n] for n in name], "value": value}
+    source: Any = {n: np.array(cells) for n, cells in columns.items()}
+    if kind == "file":
+        source = tmp_path / "run.csv"
+        rows = zip(*columns.values(), strict=True)
+        lines = [",".join(columns), *(f"{t:.2f},{k},{v!r}" for t, k, v in rows)]
+        source.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    told = {c: {**SI[c], "column": str(key[n])} for c, n in MAP.items()}
+    check_values(read_log(source, told, check=False), atol=1e-8)
+    with pytest.raises(InvalidInput, match=r"'99', which is not in the file.* 17, 18, "):
+        read_log(source, {**told, "vx_mps": "99"}, check=False)
+
+
+def test_devices_that_are_numbers() -> None:
+    time, name, value = (np.array(x * 2) for x in zip(*readings(), strict=True))
+    device = np.repeat([4, 7], time.size // 2)
+    both = {"time": time, "field": name, "value": np.where(device == 4, value, 0.5 * value),
+            "device_id": device}  # fmt: skip
+    names = {c: {**SI[c], "column": f"4.{n}"} for c, n in MAP.items()}
+    log = read_log(both, names, check=False)
+    check_values(log)
+    np.testing.assert_allclose(log["7.LatAcc"], 0.5 * measured(FAST)["LatAcc"])
+
+
 def test_text_among_the_readings(tmp_path: Path) -> None:
     rows = "\n".join(f"{t:.2f},Gear,{'D' if t < 2.0 else 'N'},-" for t in FAST)
     path = tmp_path / "run.csv"

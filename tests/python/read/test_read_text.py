@@ -78,6 +78,26 @@ def test_numbers_that_are_none_to_a_computer_have_a_remedy(tmp_path: Path) -> No
         read_log(write(tmp_path, ",".join(NAMES), *rows), {**TIMED, "time_s": {"rate_hz": 100}})
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("run.ld", b"\x40\0\0\0" + bytes(500), "is a log of MoTeC.*export it as CSV from i2"),
+        ("run.ibt", b"\2\0\0\0" + bytes(500), "is telemetry of iRacing.*export it as CSV"),
+        ("run.xrk", b"<hCNF" + bytes(500), "is a log of AiM.*from Race Studio"),
+        ("run.dat", bytes(500), "holds bytes that are no text"),
+        ("run.gpx", b"<?xml version='1.0'?><gpx></gpx>", "is an XML document, such as GPX"),
+        ("run.txt", b"$GPRMC,103100.00,A,4800.0,N\n", "is a record of NMEA sentences"),
+    ],
+)
+def test_files_of_loggers_that_are_no_text(
+    tmp_path: Path, name: str, content: bytes, words: str
+) -> None:
+    """Zeros are no UTF-16 text."""
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InvalidInput, match=words):
+        read_log(tmp_path / name)
+
+
 def test_a_last_line_that_was_cut_off(tmp_path: Path) -> None:
     lines = [",".join(row) for row in (NAMES, *cells())]
     path = write(tmp_path, *lines, "4.00,0.1")

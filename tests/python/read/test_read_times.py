@@ -89,12 +89,25 @@ def at(t: float, offset_h: int) -> str:
         lambda t: f"59:{58 + t:06.3f}" if t < 2 else f"00:{t - 2:06.3f}",
         lambda t: at(t, 1 if t < 2 else 2),
         lambda t: f"12:00:0{int(t + 1e-6)}:{round(1e3 * t) % 1000:03d}",
+        lambda t: f"31-May-2026 23:59:{58 + t}" if t < 2 else f"01-Jun-2026 00:00:{t - 2:06.3f}",
+        lambda t: f"31. Mai 2026 23:59:{58 + t}" if t < 2 else f"1 Juni 2026 0:00:{t - 2:06.3f}",
+        lambda t: f"Sat Nov 28 {10 + (t > 2)}:00:{t:06.3f} GMT+{1 + (t > 2):02d}:00 2026",
+        lambda t: f"Sat Nov 28 10:00:{t:06.3f} 2026",
+        lambda t: f"2026/5/31 23:59:{58 + t}" if t < 2 else f"2026/6/1 00:00:{t - 2:06.3f}",
     ],
-    ids=["noon", "midnight", "minutes over the hour", "summer time begins", "colon before ms"],
+    ids=["noon", "midnight", "minutes over the hour", "summer time begins", "colon before ms",
+         "named month", "German month", "Java's date", "C's date", "year first"],
 )  # fmt: skip
 def test_stamps(tmp_path: Path, stamp: Callable[[float], str]) -> None:
     log = read_log(csv(tmp_path, stamp), {**SI, "time_s": "Time"}, check=False)
     np.testing.assert_allclose(log["time_s"], FAST, atol=1e-6)
+
+
+@pytest.mark.parametrize("cell", ["31-Foo-2026 10:00:00", "31-May-26 10:00", "May 2026"])
+def test_what_is_no_date_stays_text(tmp_path: Path, cell: str) -> None:
+    path = csv(tmp_path, lambda t: cell)
+    with pytest.raises(InvalidInput, match=f"first cell is '{cell}'|'{cell}' in line 2"):
+        read_log(path, {**SI, "time_s": "Time"}, check=False)
 
 
 def test_days_of_a_spreadsheet(tmp_path: Path) -> None:

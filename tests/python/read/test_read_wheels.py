@@ -61,10 +61,38 @@ def test_another_speed_is_taken_before_them(right: sv.Log, rolling: Columns) -> 
 
 
 @pytest.mark.parametrize("unit", ["", " [rpm]", " [rad/s]"])
-def test_turns_of_the_wheels_are_no_speed(right: sv.Log, rolling: Columns, unit: str) -> None:
-    """They look like one in km/h."""
-    turned = {n.replace(" [km/h]", unit): x for n, x in rolling.items()}
-    assert "vx_mps" in sv.propose_channels(turned).missing
+def test_turns_of_the_wheels_are_no_speed(
+    tmp_path: Path, right: sv.Log, rolling: Columns, unit: str
+) -> None:
+    """They look like one in km/h. The user has to say which radius makes one of them."""
+    turned = {n.replace(" [km/h]", unit): x / 3.6 / 0.3 for n, x in rolling.items()}
+    turned |= {f"Brake pressure {w}": x for w, x in zip(WHEELS, rolling.values(), strict=False)}
+    found = sv.propose_channels(turned)
+    assert "vx_mps" in found.missing
+    text = found.to_toml()
+    assert "nothing was found but wheels; take the axle that is not driven" in text
+    left = f'# vx_mps = {{ column = "WhlSpd_RL{unit}", factor = 1.0'
+    entry = f'{left}, mean_with = ["WhlSpd_RR{unit}"] }}'
+    assert entry in text
+    both = text.replace(entry, entry[2:].replace("factor = 1.0", "factor = 0.3"))
+    (tmp_path / "map.toml").write_text(both)
+    log = sv.read_log(turned, tmp_path / "map.toml")
+    np.testing.assert_allclose(log["vx_mps"], right["vx_mps"])
+
+
+def test_a_proposal_says_how_axes_with_z_down_are_mapped(right: sv.Log) -> None:
+    """A log of which all lateral channels are turned round is that of a car in a mirror."""
+    turned = ("yaw_rate_radps", "ay_mps2", "vy_mps", "steer_rad")
+    sae = {c: (-1.0 if c in turned else 1.0) * right[c] for c in right.channels}
+    text = sv.propose_channels(sae).to_toml()
+    assert f"turn round the factors of {', '.join(turned)} together" in text
+    found = {c: {"column": c, "factor": -1.0 if c in turned else 1.0} for c in right.channels}
+    np.testing.assert_array_equal(sv.read_log(sae, found)["ay_mps2"], right["ay_mps2"])
+
+
+def test_pressures_of_wheels_are_no_hint(rolling: Columns) -> None:
+    others = {n.replace("WhlSpd", "p_tyre").split(" [")[0]: x for n, x in rolling.items()}
+    assert "nothing was found but" not in sv.propose_channels(others).to_toml()
 
 
 @pytest.mark.parametrize("others", ["RR", 1, [1], ["RL"], ["RR", "RR"]])

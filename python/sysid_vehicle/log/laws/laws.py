@@ -19,6 +19,7 @@ CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
 # Scale errors of good sensors, gravity through roll, and geometry that is not known.
 SCALE_STD = 0.12
 LINEAR_MPS2 = 5.0  # lateral acceleration up to which tyres are nearly linear
+LATERAL = ("yaw_rate_radps", "ay_mps2", "vy_mps", "steer_rad")
 OFFSET = 0.3  # of the steering angle, as a share of its size
 
 _NOT_ONE = 5.0  # deviations from the right unit before another is looked for
@@ -26,9 +27,22 @@ _FITS = 3.0  # deviations within which another unit fits
 _UNNAMED = math.log(2.5)  # a scale that is farther off is refused although no unit explains it
 
 Slip = tuple[str, str, str]
-Slips = tuple[tuple[float, tuple[Slip, ...]], ...]
+Slipped = tuple[float, tuple[Slip, ...]]
+# What is named where it explains the coefficient best, and what else looks so; that is named beside
+# it where it is nearer.
+Slips = tuple[Slipped | tuple[float, tuple[Slip, ...], tuple[Slipped, ...]], ...]
 VX_KMH: Slip = ("vx_mps", "km/h", "factor = 0.2777778")
 VX_MPH: Slip = ("vx_mps", "miles per hour", "factor = 0.44704")
+_VX_KNOTS: Slip = ("vx_mps", "knots", "factor = 0.5144444")
+_VX_FEET: Slip = ("vx_mps", "feet per second", "factor = 0.3048")
+_VX_WHEEL: Slip = ("vx_mps", "rad/s of a wheel", "factor = the radius of the tyre [m]")
+_RADIUS_M = 0.31  # of a usual car's tyre
+_RPM = 2.0 * math.pi / 60.0
+_VX_RPM: Slip = ("vx_mps", "rpm of a wheel", "factor = 0.1047198 times the radius of the tyre [m]")
+# Beside km/h, beside miles per hour, and beside an acceleration in g and a speed in km/h.
+LIKE_KMH: tuple[Slipped, ...] = ((0.3048, (_VX_FEET,)), (_RADIUS_M, (_VX_WHEEL,)))
+LIKE_MPH: tuple[Slipped, ...] = ((0.5144444, (_VX_KNOTS,)),)
+LIKE_G_KMH: tuple[Slipped, ...] = ((_RPM * _RADIUS_M, (_VX_RPM,)),)
 
 
 @dataclass(frozen=True)
@@ -118,10 +132,17 @@ def cosine(x: FloatArray, y: FloatArray) -> float:
 
 def wrong_sign(channel: str, what: str, values: FloatArray, drive: Drive) -> Implausible:
     """What is said of a channel with the opposite sign."""
+    others = [name for name in LATERAL if name in drive.motion.channels and name != channel]
+    mirrored = ""
+    if channel in LATERAL:  # a log of which all are turned round is that of a car in a mirror
+        mirrored = (
+            f", or for {', '.join(others[:-1])} and {others[-1]} instead if these are positive to "
+            f"the right (axes with z down, SAE J670)"
+        )
     return Implausible(
         channel,
-        f"{channel}: wrong sign: it {what}, {drive.place(values)} "
-        f"(ISO 8855: x forward, y and yaw to the left); put factor = -1 in the channel map",
+        f"{channel}: wrong sign: it {what}, {drive.place(values)} (ISO 8855: x forward, y and yaw "
+        f"to the left); put factor = -1 for it in the channel map{mirrored}",
     )
 
 
@@ -145,16 +166,22 @@ def check_scale(
     """
     deviation = math.hypot(usual, deviation / ratio)
     off = abs(math.log(ratio)) / deviation
-    best, channels = min(slips, key=lambda slip: abs(math.log(ratio / slip[0])))
+    slip = min(slips, key=lambda slip: abs(math.log(ratio / slip[0])))
+    best, channels = slip[:2]
     miss = abs(math.log(ratio / best)) / deviation
     shown = 1.0 / ratio if inverse else ratio
     if off > _NOT_ONE and miss < _FITS and off**2 - miss**2 > _NOT_ONE**2:
-        units = " and ".join(f"{name}: seems to be in {unit}" for name, unit, _ in channels)
-        remedy = " and ".join(f"{factor} for {name}" for name, _, factor in channels)
+        nearer = sorted(
+            (far, others)
+            for factor, others in (slip[2] if len(slip) > 2 else ())
+            if (far := abs(math.log(ratio / factor)) / deviation) < miss
+        )
+        likely = [*(others for _, others in nearer), channels]
+        units, remedies = zip(*(_told(one) for one in _together(likely)), strict=True)
         raise KnownUnit(
             channels[0][0],
-            f"{units}: {formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; put "
-            f"{remedy} in the channel map",
+            f"{', or '.join(units)}: {formula} is {shown:.3g} instead of about 1, "
+            f"{drive.place(driver)}; put {', or '.join(remedies)} in the channel map",
         )
     if off > _NOT_ONE and abs(math.log(ratio)) > _UNNAMED:
         raise Implausible(
@@ -162,3 +189,19 @@ def check_scale(
             f"{formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; check the units "
             f"of these channels and put their factors in the channel map",
         )
+
+
+def _together(likely: list[tuple[Slip, ...]]) -> list[tuple[Slip, ...]]:
+    """Ways to explain a coefficient, those by a unit of one channel as one."""
+    if {len(way) for way in likely} != {1} or len({way[0][0] for way in likely}) > 1:
+        return likely
+    units, factors = ([way[0][k] for way in likely] for k in (1, 2))
+    return [((likely[0][0][0], " or ".join(units), " or ".join(factors)),)]
+
+
+def _told(way: tuple[Slip, ...]) -> tuple[str, str]:
+    """What seems to be wrong, and the remedy."""
+    return (
+        " and ".join(f"{name}: seems to be in {unit}" for name, unit, _ in way),
+        " and ".join(f"{factor} for {name}" for name, _, factor in way),
+    )

@@ -9,6 +9,9 @@ from ...vehicle import GRAVITY_MPS2
 from .lags import sideways
 from .laws import (
     EXCITED,
+    LIKE_G_KMH,
+    LIKE_KMH,
+    LIKE_MPH,
     SCALE_STD,
     VX_KMH,
     VX_MPH,
@@ -39,9 +42,9 @@ _DRAG_PER_M = 0.003  # half the air's density times a large drag area, over the 
 _AX_G = ("ax_mps2", "g", "factor = 9.80665")
 _LONGITUDINAL_SLIPS: Slips = (
     (GRAVITY_MPS2, (_AX_G,)),
-    (3.6, (VX_KMH,)),
-    (1.0 / 0.44704, (VX_MPH,)),
-    (3.6 * GRAVITY_MPS2, (_AX_G, VX_KMH)),
+    (3.6, (VX_KMH,), tuple((1.0 / factor, one) for factor, one in LIKE_KMH)),
+    (1.0 / 0.44704, (VX_MPH,), tuple((1.0 / factor, one) for factor, one in LIKE_MPH)),
+    (3.6 * GRAVITY_MPS2, (_AX_G, VX_KMH), tuple((1.0 / factor, one) for factor, one in LIKE_G_KMH)),
 )
 
 

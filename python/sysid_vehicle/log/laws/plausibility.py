@@ -24,6 +24,10 @@ from .lags import lag_notes
 from .laws import (
     CLEARLY,
     EXCITED,
+    LATERAL,
+    LIKE_G_KMH,
+    LIKE_KMH,
+    LIKE_MPH,
     MIN_WINDOWS,
     SCALE_STD,
     VX_KMH,
@@ -50,7 +54,6 @@ from .wheelbase import check_steering, gripping, is_model_car
 
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
 _ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
-_LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2", "steer_rad")
 _ONE_WAY = 0.02  # of the largest reading: a channel that hardly goes below zero
 _HOLDS = 0.2  # of what it demands: a law that holds this closely needs no regression
 
@@ -66,11 +69,11 @@ _RAD, _G = math.pi / 180.0, GRAVITY_MPS2
 _LATERAL_SLIPS: Slips = (
     (_RAD, (_YAW_DEG,)),
     (1.0 / _G, (_AY_G,)),
-    (1.0 / 3.6, (VX_KMH,)),
-    (0.44704, (VX_MPH,)),
+    (1.0 / 3.6, (VX_KMH,), LIKE_KMH),
+    (0.44704, (VX_MPH,), LIKE_MPH),
     (_RAD / _G, (_YAW_DEG, _AY_G)),
     (_RAD / 3.6, (_YAW_DEG, VX_KMH)),
-    (1.0 / _G / 3.6, (_AY_G, VX_KMH)),
+    (1.0 / _G / 3.6, (_AY_G, VX_KMH), LIKE_G_KMH),
     (_RAD / _G / 3.6, (_YAW_DEG, _AY_G, VX_KMH)),
 )
 _SLIDING_SLIPS: Slips = ((3.6, (_VY_KMH,)), (1.0 / 0.44704, (_VY_MPH,)))
@@ -136,7 +139,7 @@ def _beside_a_bank(notes: list[Contradiction], bank_deg: float | None) -> list[C
         return notes
     told = f"; a road that leans by up to {bank_deg:.2g} deg into its turns looks like that, too"
     return [
-        replace(n, text=f"{n.text}{told}", on_the_level=True) if n.channel in _LATERAL else n
+        replace(n, text=f"{n.text}{told}", on_the_level=True) if n.channel in LATERAL else n
         for n in notes
     ]
 

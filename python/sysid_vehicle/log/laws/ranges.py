@@ -23,29 +23,40 @@ _HOLDING_N, _HOLDING_NS2PM2 = 5e4, 6.2
 # Readings beyond the range are dropouts where they are so few, and jump there and back by more than
 # this part of what they read. A channel in another unit goes there step by step.
 _LOST_SHARE, _LOST_JUMP = 0.05, 0.5
+_SAME = 0.9  # factors of units that magnitudes do not tell apart
+_SPEEDS = (("km/h", 1.0 / 3.6), ("cm/s", 0.01), ("mm/s", 1e-3))
+_ACCELERATIONS = (("mg", 0.00980665), ("cm/s2", 0.01), ("mm/s2", 1e-3))
 
 
 @dataclass(frozen=True)
 class _Range:
     """Largest magnitude of a channel, white noise that is impossible, and that is unusual.
 
-    `likely` is what the channel may be instead, and the remedy.
+    `likely` are units in which the channel may be instead, with their factors, or the whole remedy.
     """
 
     largest: float
     jump: float
     noise: float
-    likely: str
+    likely: tuple[tuple[str, float], ...] | str
+
+    def remedy(self, size: float) -> str:
+        """What may be wrong where values are so large: the units that explain it with least."""
+        if isinstance(self.likely, str):
+            return self.likely
+        # The unit of the largest factor that is small enough, and what looks like it.
+        within = [factor for _, factor in self.likely if factor * size <= self.largest]
+        least = max(within, default=min(factor for _, factor in self.likely))
+        alike = [(u, f) for u, f in self.likely if _SAME < f / least < 1.0 / _SAME]
+        return "; ".join(f"if it is in {unit}, put factor = {factor:.7g}" for unit, factor in alike)
 
 
 _RANGES = {
-    "vx_mps": _Range(150.0, 2.0, 0.5, "if it is in km/h, put factor = 0.2777778"),
-    "vy_mps": _Range(60.0, 1.5, 0.2, "if it is in km/h, put factor = 0.2777778"),
-    "yaw_rate_radps": _Range(
-        10.0, 0.5, 0.05, f"if it is in degrees per second, put factor = {DEG}"
-    ),
-    "ax_mps2": _Range(60.0, 15.0, 5.0, "if it is in mg, put factor = 0.00980665"),
-    "ay_mps2": _Range(60.0, 15.0, 5.0, "if it is in mg, put factor = 0.00980665"),
+    "vx_mps": _Range(150.0, 2.0, 0.5, _SPEEDS),
+    "vy_mps": _Range(60.0, 1.5, 0.2, _SPEEDS),
+    "yaw_rate_radps": _Range(10.0, 0.5, 0.05, (("degrees per second", DEG),)),
+    "ax_mps2": _Range(60.0, 15.0, 5.0, _ACCELERATIONS),
+    "ay_mps2": _Range(60.0, 15.0, 5.0, _ACCELERATIONS),
     "steer_rad": _Range(
         1.2,
         0.1,
@@ -158,10 +169,11 @@ def check_ranges(
         size = np.abs(median_of_five(filled(values)))
         if size.max() > limits.largest:
             i = int(np.argmax(size))
+            remedy = limits.remedy(float(size[i]))
             raise Implausible(
                 name,
                 f"{name}: {filled(values)[i]:.4g} {CHANNELS[name].unit} at {at(i, time_s)} is no "
-                f"value of a car (at most {limits.largest:g}): {limits.likely} in the channel map",
+                f"value of a car (at most {limits.largest:g}): {remedy} in the channel map",
             )
         lone = np.flatnonzero(np.abs(values) > limits.largest)
         if lone.size:

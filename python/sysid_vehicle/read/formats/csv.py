@@ -211,6 +211,12 @@ def _is_reading(cell: str) -> bool:
     return alike or seconds_of_stamps([cell]) is not None
 
 
+def _is_remark(row: Sequence[str]) -> bool:
+    """Tell whether a row holds text and no reading: what a logger writes when it ends."""
+    told = [cell.strip() for cell in row if cell.strip()]
+    return not any(map(_is_reading, told)) and any(c.lower() not in _MISSING for c in told)
+
+
 def _names_and_units(
     names: tuple[str, ...], lead: list[tuple[str, ...]], told_so: bool | None
 ) -> tuple[tuple[str, ...], dict[str, str], list[tuple[str, ...]]]:
@@ -316,6 +322,9 @@ def _read_slow(
             )
         rows.append(row)
         lines.append(line)
+    while len(rows) > 1 and _is_remark(rows[-1]) and not _is_remark(rows[0]):
+        notes.append(f"line {lines[-1]} at the end holds text and no reading, and was left out")
+        del rows[-1], lines[-1]
     if not rows:
         raise InvalidInput(
             "there are only empty cells below the column names; record the log again"

@@ -81,9 +81,12 @@ def _recorded(fields: dict[str, Any], path: tuple[str, ...], leaves: list[Leaf])
     """Take the layouts of Simulink and dSPACE, in which names of channels are values."""
     if {"time", "signals"} <= set(fields):
         time = np.atleast_1d(np.asarray(fields["time"], dtype=np.float64))
-        for k, signal in enumerate(np.atleast_1d(fields["signals"]), 1):
-            name = _text(getattr(signal, "label", "")) or f"signals({k})"
-            leaves.append(Leaf((*path, name), np.asarray(signal.values), time_s=time))
+        signals = np.atleast_1d(fields["signals"])
+        for k, signal in enumerate(signals, 1):
+            name = _text(getattr(signal, "label", ""))
+            alone = signals.size == 1 and name in ("", *path[-1:])  # the struct is called like it
+            own = path if alone and path else (*path, name or f"signals({k})")
+            leaves.append(Leaf(own, np.asarray(signal.values), time_s=time))
         return True
     if {"X", "Y"} <= set(fields):
         axes = np.atleast_1d(fields["X"])

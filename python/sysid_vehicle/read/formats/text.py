@@ -27,8 +27,18 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b"%PDF", "a PDF document", _EXPORT),
     (b"<!DOCTYPE", "a web page", "download the file itself"),
     (b"<html", "a web page", "download the file itself"),
+    (b"<?xml", "an XML document, such as GPX", _EXPORT),
+    (b"$GP", "a record of NMEA sentences", _EXPORT),
+    (b"$GN", "a record of NMEA sentences", _EXPORT),
     (b"version https://git-lfs", "a pointer of Git LFS", "fetch the file with git lfs pull"),
 )
+# Binary files of loggers that no reader here has, by the ends of their names.
+_AIM = ("a log of AiM", "export it as CSV from Race Studio")
+_LOGGERS = {
+    ".ld": ("a log of MoTeC", "export it as CSV from i2"),
+    ".ibt": ("telemetry of iRacing", _EXPORT),
+    **dict.fromkeys((".xrk", ".xrz", ".drk"), _AIM),
+}
 # Objects, or rows of them; in one line or in one for each row.
 _JSON = re.compile(rb'\A(\xef\xbb\xbf)?\s*(\{\s*"|\[\s*[\[{])')
 _UTF_32 = ((codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"))
@@ -58,10 +68,13 @@ def read_text_table(path: str | Path) -> str:
         if raw.startswith(mark):
             return _decoded(raw, encoding, path)
     if b"\0" in raw[:4096]:
-        sample = raw[:4096]
-        for encoding, zeros in (("utf-16-le", sample[1::2]), ("utf-16-be", sample[::2])):
-            if zeros.count(0) > 0.9 * len(zeros):
+        even, odd = raw[:4096:2], raw[1:4096:2]
+        for encoding, zeros, others in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
+            if zeros.count(0) > 0.9 * len(zeros) and others.count(0) < 0.1 * len(others):
                 return _decoded(raw, encoding, path)
+        what, remedy = _LOGGERS.get(Path(path).suffix.lower(), ("", ""))
+        if what:
+            raise InvalidInput(f"{path}: is {what}, which cannot be read; {remedy}")
         raise InvalidInput(
             f"{path}: holds bytes that are no text (first at byte {raw.index(0)}); export the log "
             f"as CSV"

@@ -43,7 +43,8 @@ class View:
     @property
     def rising(self) -> list[str]:
         """Columns of a table that rise from each row to the next."""
-        columns = self._held.columns if isinstance(self._held, Table) else {}
+        held = self._held
+        columns = {**held.seconds, **held.columns} if isinstance(held, Table) else {}
         return [n for n, x in columns.items() if x.size >= _FEWEST and (np.diff(x) > 0.0).all()]
 
     @property

@@ -29,6 +29,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"^[uv] ?x( mps)?$",
         r"twist linear x$|(long\w*|forward) (speed|vel\w*)|(speed|vel\w*) (x|long\w*)$",
         r"(vehicle|ground|corr\w*|gps|car|veh) (speed|vel\w*)|^v (veh|car|ego)|v (fzg|signal)",
+        r"^(fzg|fahrzeug) ?geschw\w*|^veh v\b",
         r"(speed|vel\w*) forward$|\bvel\w* hor x$|^wheel based vehicle speed",
         r"^(speed|velocity|vel|geschwindigkeit|v)$",
         r"\b(speed|velocity|geschwindigkeit)\b",
@@ -44,6 +45,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"yaw ?rate|yaw ?vel\w*|gier ?(rate|geschw\w*)",
         r"angular velocity z$|gyro\w* (z|yaw)|twist angular z$|psi ?(p|dot|rate)$",
         r"^(w|omega|rate|gyro|ang vel) ?z$|\bgyro z\b|\byaw\b.*\b(dps|radps|degps)\b",
+        r"\bz (rate of rotation|rotation rate)$",
         r"\b(ang\w*|rotation) rate (z|down)$|\brate (body|hor) z$|\bheading rate$|^r$|^d ?psi$",
         r"^(imu|ins|body) (g|w|omega|gyr|rate) ?z$|^gyr ?z$",
         r"\b(lacet|imbardata|guinada)\b|^gier|girhastighet|ヨーレート|横摆角速度",
@@ -51,21 +53,22 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
     "ax_mps2": (
         r"^a ?x( cg)?( mps2)?$|acc ?x$|x acc\w*$",
         r"long\w* (acc\w*|g\b)|acc\w* (x|long\w*)|g (force )?(long|x)\w*",
-        r"inline acc\w*|laengsbeschl\w*|langsversnelling",
+        r"inline acc\w*|laengs ?beschl\w*|langsversnelling|\blon(g|gi)?acc?\b",
         r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
         r"^(imu|ins|body) a ?x$",
         r"\bacc (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
     ),
     "ay_mps2": (
         r"^a ?y( cg)?( mps2)?$|acc ?y$|y acc\w*$",
-        r"lat\w* (acc\w*|g\b)|acc\w* (y|lat\w*)|g (force )?(lat|y)\w*|querbeschl\w*",
+        r"lat\w* (acc\w*|g\b)|acc\w* (y|lat\w*)|g (force )?(lat|y)\w*|quer ?beschl\w*",
+        r"\blatacc?\b",
         r"^ace?l\w* (lat|trans)\w*|^acc?el\w* trans\w*|dwarsversnelling",
         r"^(imu|ins|body) a ?y$",
         r"\bacc (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
     ),
     "steer_rad": (
         r"road ?wheel angle|^steer rad$|front wheel angle",
-        r"steer\w* ?(wheel )?ang\w*|lenk(rad)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
+        r"steer\w* ?(wheel )?ang\w*|lenk ?(rad ?)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
         r"\b(steer|steering|steered|delta( ?wheel)?)\b|\b(sas|lws|lwi) (ang\w*|winkel)$",
         r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",
     ),
@@ -119,6 +122,9 @@ _SI = {
 _SIGN = {"vz", "vorzeichen", "sign", "sgn"}
 """Words in names of what is not 0 where another signal is negative."""
 
+_FAST = frozenset(("speed", "rpm", "omega", "geschw", "drehz", "drehzahl", "raddrehzahl"))
+"""Words in names of speeds of wheels."""
+
 _WHEELS = {  # in English and German
     **dict.fromkeys(("fl", "lf", "vl"), ("front", "left")),
     **dict.fromkeys(("fr", "rf", "vr"), ("front", "right")),
@@ -167,6 +173,9 @@ def rank(name: str, unit: str, channel: str) -> float:
         ),
         default=0.0,
     )
+    last = words(name.rpartition(".")[2])
+    if score == 0.0 and last != text:  # of a struct, a message or a sensor: after all others
+        score = 0.5 * any(re.search(p, last) for p in patterns)
     fits = plain(unit) in FACTORS[si_unit(channel, name)]
     if score == 0.0 and fits and channel in _IN_ITS_UNIT:
         score = float(re.search(_IN_ITS_UNIT[channel], forms[2]) is not None)
@@ -197,6 +206,11 @@ def sign_of(name: str, others: Iterable[str]) -> str:
         if {*there} & _SIGN and Counter({w: k for w, k in there.items() if w not in _SIGN}) == own:
             return other
     return ""
+
+
+def is_speed(name: str) -> bool:
+    """Tell whether a name says that it is one of a speed, along the ground or of turning."""
+    return not _FAST.isdisjoint(words(name).split())
 
 
 def wheel_of(name: str) -> tuple[str, str] | None:

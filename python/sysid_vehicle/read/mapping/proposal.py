@@ -7,9 +7,15 @@ from dataclasses import dataclass, field
 
 from ...errors import InvalidInput
 from ...log import CHANNELS, listed
+from ...log.laws.laws import LATERAL
 from .channel_map import ChannelMap
 from .ground import PARTS, Ground
 from .source import Source
+
+_WHEELS = (
+    "take the axle that is not driven, and as the factor in rad/s the radius of its tyres [m], "
+    "in rpm 0.1047198 times that, in km/h 0.2777778"
+)
 
 
 @dataclass(frozen=True)
@@ -53,12 +59,15 @@ class Proposal:
         Velocity over ground and heading, by part, where they make the speeds of the body.
     counted_from : str
         Where its angles begin.
+    wheels : tuple of str
+        Columns of the wheels of one axle, in no unit of a speed, where there is no other speed.
     """
 
     channels: Mapping[str, Proposed]
     missing: tuple[str, ...]
     ground: Mapping[str, Proposed] = field(default_factory=dict)
     counted_from: str = "north"
+    wheels: tuple[str, ...] = ()
 
     @property
     def channel_map(self) -> ChannelMap:
@@ -72,7 +81,14 @@ class Proposal:
 
     def to_toml(self) -> str:
         """The map as a file to look through and to edit."""
-        lines = ["# Proposed channel map: look at every line, mend what is wrong.", "[channels]"]
+        lines = ["# Proposed channel map: look at every line, mend what is wrong."]
+        turned = [c for c in LATERAL if c in self.channels]
+        if not self.ground and len(turned) > 1:
+            lines.append(
+                "# Nothing tells left from right: of a log in axes with z down (SAE J670: y and "
+                f"yaw to the right) turn round the factors of {listed(turned)} together."
+            )
+        lines.append("[channels]")
         for channel, p in self.channels.items():
             lines.append(f"# {CHANNELS[channel].meaning} [{CHANNELS[channel].unit}]: {p.why}")
             if p.others:
@@ -85,8 +101,15 @@ class Proposal:
             entry += f", sign = {_quoted(p.sign)}" if p.sign else ""
             lines.append(f"{channel} = {{ {entry} }}")
         for name in self.missing:
-            lines.append(f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found")
-            lines.append(f'# {name} = {{ column = "", factor = 1.0 }}')
+            wheels = self.wheels if name == "vx_mps" else ()
+            but = f" but wheels; {_WHEELS}" if wheels else ""
+            column, *others = wheels or ("",)
+            lines.append(
+                f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found{but}"
+            )
+            entry = f"column = {_quoted(column)}, factor = 1.0"
+            entry += f", mean_with = [{', '.join(map(_quoted, others))}]" if others else ""
+            lines.append(f"# {name} = {{ {entry} }}")
         if self.ground:
             lines += [
                 "",

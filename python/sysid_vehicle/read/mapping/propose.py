@@ -18,7 +18,7 @@ from ..registry import blamed, recognised
 from ..units import factor_to
 from .ground import PARTS
 from .look import Signal, View, by_name, ended, even, ranked, stated
-from .names import is_sideslip, si_unit, sign_of, wheel_of
+from .names import is_sideslip, is_speed, si_unit, sign_of, wheel_of
 from .navigation import (
     NAMED,
     Navigation,
@@ -93,6 +93,11 @@ def propose_channels(
             for channel in CHANNELS
             if not (channel == "time_s" and view.has_times) and (found := ranked(view, channel))
         }
+        if {"u", "v"} <= {*view.names}:  # in textbooks speeds along and across
+            chosen |= {"vx_mps": ["u"], "vy_mps": ["v"]}
+        if "time_s" in chosen:  # a clock of whole seconds repeats between samples
+            steady = {*view.rising}
+            chosen["time_s"].sort(key=lambda name: name not in steady)
         if "time_s" not in chosen and not view.has_times:
             rising = view.stamps or [
                 name for name in view.rising if not any(name in c for c in chosen.values())
@@ -135,6 +140,7 @@ class _Guess:
         self.signs: dict[str, str] = {}
         self.beside: tuple[str, ...] = ()
         self.lost: set[str] = set()
+        self.wheels: tuple[str, ...] = ()
         self.parts = self.parts or self._navigated()
         if "vx_mps" not in self.first and "east" not in self.parts:
             self._wheels(axles)
@@ -168,8 +174,15 @@ class _Guess:
     def _wheels(self, axles: tuple[str, ...]) -> None:
         """Take the wheels of one axle where no other speed is logged, if their unit is stated.
 
-        An angular speed of a wheel looks like a speed in km/h.
+        An angular speed of a wheel looks like a speed in km/h: of others a speed may only be made
+        by the user.
         """
+        turning = {
+            wheel: name
+            for name in self.view.names
+            if (wheel := wheel_of(name))
+            and (is_speed(name) or factor_to("rad/s", self.view.said(name, "rad/s")))
+        }
         speeds = {
             wheel: name
             for name in self.view.names
@@ -177,6 +190,8 @@ class _Guess:
         }
         for axle in axles:
             pair = [speeds.get((axle, side), "") for side in ("left", "right")]
+            others = [turning.get((axle, side), "") for side in ("left", "right")]
+            self.wheels = self.wheels or (tuple(others) if all(others) else ())
             if all(pair):
                 self.first["vx_mps"], self.beside = pair[0], (pair[1],)
                 self.chosen = {**self.chosen, "vx_mps": list(speeds.values())}
@@ -323,7 +338,7 @@ class _Guess:
         made |= {"time_s"} if self.view.has_times else set()
         missing = [c for c in CHANNELS if CHANNELS[c].required and c not in {*channels, *made}]
         counted_from = "north" if nav is None else nav.counted_from
-        return Proposal(channels, tuple(missing), ground, counted_from)
+        return Proposal(channels, tuple(missing), ground, counted_from, self.wheels)
 
     def _channel(self, channel: str, name: str) -> Proposed:
         unit = self.view.unit(name, si_unit(channel, name))

@@ -1,0 +1,67 @@
+"""Units told by the laws of motion and by magnitude: what looks alike is named beside the usual."""
+
+import numpy as np
+import pytest
+from single_track import Change, drive, times
+
+from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.log import Log
+
+G = 9.80665
+WRONG: dict[str, tuple[Change, list[str]]] = {
+    "vx in knots": (
+        times(vx_mps=1 / 0.514444),
+        ["vx_mps: seems to be in knots or miles", "factor = 0.5144444 or factor = 0.44704 for vx"],
+    ),
+    "vx in ft/s": (
+        times(vx_mps=1 / 0.3048),
+        ["vx_mps: seems to be in feet per second or", "factor = 0.3048 or", "0.2777778 for vx"],
+    ),
+    "vx in rad/s of wheels": (
+        times(vx_mps=1 / 0.325),
+        ["vx_mps: seems to be in rad/s of a wheel or", "factor = the radius of the tyre [m] or"],
+    ),
+    "vx in rpm of wheels": (
+        times(vx_mps=60.0 / (2.0 * np.pi * 0.32)),
+        ["seems to be in rpm of a wheel, or ay", "0.1047198 times the radius of the tyre"],
+    ),
+    "vx in mm/s": (times(vx_mps=1e3), ["vx_mps: ", "if it is in mm/s, put factor = 0.001 in"]),
+    "vx in cm/s": (times(vx_mps=1e2), ["vx_mps: ", "if it is in cm/s, put factor = 0.01 in"]),
+    "ay in mg": (
+        times(ay_mps2=1e3 / G),
+        ["if it is in mg, put factor = 0.00980665; if it is in cm/s2, put factor = 0.01 in"],
+    ),
+    "straight, vx in knots": (
+        lambda data: data.update(drive(0.0), vx_mps=drive(0.0)["vx_mps"] / 0.514444),
+        ["vx_mps: seems to be in knots or miles", "0.5144444"],
+    ),
+    "straight, vx in rpm of wheels": (
+        lambda data: data.update(drive(0.0), vx_mps=drive(0.0)["vx_mps"] / 0.0325),
+        ["seems to be in rpm of a wheel, or ax", "0.1047198 times the radius"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_the_unit_is_named(case: str) -> None:
+    change, words = WRONG[case]
+    data = drive()
+    change(data)
+    with pytest.raises(InvalidInput) as caught:
+        Log.from_arrays(data, name="lap 3")
+    for word in ["lap 3: ", *words]:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (3.6, "vx_mps: seems to be in km/h: "),
+        (1 / 0.44704, "vx_mps: seems to be in miles per hour: "),
+    ],
+)
+def test_usual_units_are_named_alone(factor: float, words: str) -> None:
+    data = drive()
+    data["vx_mps"] *= factor
+    with pytest.raises(InvalidInput, match=words):
+        Log.from_arrays(data)
