@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -15,8 +16,8 @@ from ..errors import SysidError
 from ..log import Log, several_logs
 from ..vehicle import Vehicle
 from .condition import Conditioning
-from .faults import Rival, SensorFault, doubted, faults_of
-from .kinematics.equations import FAULTS, Readings
+from .faults import FALSE_CLAIMS, Rival, SensorFault, doubted, faults_of
+from .kinematics.equations import FAULTS, SWINGS, Readings
 from .kinematics.estimate import Estimate, estimate, noise_of, preferred
 from .kinematics.motion import Grid, Stretch
 from .kinematics.parts import cut
@@ -29,9 +30,13 @@ _MEAN_S = 0.03  # quick channels enter as means over so long
 _STEP_MEANS = 2.3607
 _STEP_SAMPLES = 1.618  # of a channel that is slower than that
 _SEARCHES = 1  # for a better explanation, from one that does without a fault
+# Nats by which a body that swings has to be likelier. By two parameters more a likelihood gains as
+# much by chance as often as a fault is claimed by chance.
+_SWINGS = -math.log(FALSE_CLAIMS)
 _FLOOR = 1e-3  # least noise, of the channel's standard deviation
 
 Told = Callable[[Estimate, Sequence[SensorFault]], bool]
+Faults = tuple[SensorFault, ...]
 
 
 @typed
@@ -94,7 +99,8 @@ def checked(
 
     `told` are signals of the logs as they were read, by default of these. `enough` is asked with
     this estimate and the faults that it tells. Parts of the driving only take claims back;
-    explanations without a fault do too, unless one of them is the better one.
+    explanations without a fault do too, unless one of them is the better one. So does a body that
+    swings, where it is likelier.
     """
     stretches = pieces(together)
     readings = readings_of(together, stretches)
@@ -109,37 +115,45 @@ def checked(
     def of(
         some: Sequence[Readings],
         where: Sequence[Stretch],
-        without: Sequence[str] = (),
+        without: Sequence[str],
         begin: dict[str, float] | None = None,
     ) -> Estimate:
         means = [averaged(r, _MEAN_S) for r in some]
         names = [name for name in _names(have) if name not in without]
         return estimate(means, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
 
-    found = of(readings, stretches)
-    faults = faults_of(found, lacking)
-    if not enough(found, faults):
+    means = [averaged(r, _MEAN_S) for r in readings]
+
+    def explained(found: Estimate, lacks: Sequence[str]) -> tuple[Estimate, Faults]:
         parts = []
         for some in cut(stretches):
             with suppress(SysidError):  # a part may hold too little
-                parts.append(of(readings_of(together, some), some))
-        if parts:
-            faults = faults_of(found, lacking, parts)
-        means = [averaged(r, _MEAN_S) for r in readings]
+                parts.append(of(readings_of(together, some), some, lacks))
+        faults = faults_of(found, lacking, parts)
         for left in range(_SEARCHES, -1, -1):
             rivals = {}
             for without in doubted([fault.name for fault in faults if fault.found]):
-                other = of(readings, stretches, without=without)
+                other = of(readings, stretches, (*lacks, *without))
                 rivals[without] = Rival(other, preferred(means, found, other))
             faults = faults_of(found, lacking, parts, rivals)
             best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
             if not left or best is None or best.worse >= 0.0:
                 break
-            better = of(readings, stretches, begin=best.estimate.faults)
+            better = of(readings, stretches, lacks, best.estimate.faults)
             if preferred(means, better, found) <= 0.0:
                 break
             found = better
             faults = faults_of(found, lacking, parts)
+        return found, faults
+
+    found = of(readings, stretches, tuple(SWINGS))
+    faults = faults_of(found, lacking)
+    if not enough(found, faults):
+        found, faults = explained(found, tuple(SWINGS))
+        if {*SWINGS} <= {*_names(have)}:
+            swinging = of(readings, stretches, ())
+            if preferred(means, swinging, found) > _SWINGS:
+                found, faults = explained(swinging, ())
     return SensorCheck(
         logs=tuple(together),
         faults=faults,
@@ -158,7 +172,7 @@ def _names(have: set[str]) -> list[str]:
     if "vy_mps" not in have:
         # The lateral equation has an unknown of its own then; only its slow part is left.
         hidden |= {"delay.speeds", "arm_x", "arm_y", "turn", "delay.ay_mps2", "lean.ay_mps2"}
-        hidden.add("gain.yaw_rate_radps")
+        hidden |= {"gain.yaw_rate_radps", *SWINGS}
     if "ax_mps2" not in have:
         hidden |= {"arm_y", "delay.vx_mps", "turn"}
     return [n for n, kind in FAULTS.items() if kind.channel in have and n not in hidden]

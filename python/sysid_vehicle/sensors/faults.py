@@ -16,7 +16,8 @@ from .kinematics.estimate import Estimate
 from .kinematics.parts import scatter
 from .texts import DEG, why_not
 
-_FALSE_CLAIMS = 0.01  # over all faults of one check
+FALSE_CLAIMS = 0.01
+"""Level of all claims of one check together."""
 _OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")
 _NEGLIGIBLE_S = 0.002  # of a delay, which harms nothing
 _LEARNED = 0.5  # share of what is known of a fault that has to come from the log
@@ -181,7 +182,7 @@ def leaning(found: Estimate, faults: Sequence[SensorFault], axis: str) -> float:
 
 def _critical(rows: int) -> float:
     """Standard errors beyond which one of so many faults is found."""
-    return float(scipy.stats.norm.isf(0.5 * _FALSE_CLAIMS / rows))
+    return float(scipy.stats.norm.isf(0.5 * FALSE_CLAIMS / rows))
 
 
 def doubted(names: Sequence[str]) -> list[tuple[str, ...]]:
@@ -297,7 +298,7 @@ class _Asked:
         """The likeliest explanation without a fault, if it is as likely as the estimate."""
         others = [rival for without, rival in self.rivals.items() if {*told.of} <= {*without}]
         rival = min(others, key=lambda rival: rival.worse, default=None)
-        return None if rival is None or rival.share < _FALSE_CLAIMS else rival
+        return None if rival is None or rival.share < FALSE_CLAIMS else rival
 
 
 def _size(found: Estimate, pick: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:

@@ -27,7 +27,7 @@ from .kinematics.estimate import Estimate
 from .kinematics.motion import Stretch
 from .settled import narrowed, settled
 from .signals import MOVING, Signal
-from .texts import ON_CORRECTION, gradient, map_line
+from .texts import ON_CORRECTION, gradient, map_line, swings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -192,6 +192,7 @@ class SensorCheck:
                     f"gradient of {gradient(fault.value):.3g} deg/g ({low:.3g} to {high:.3g}); "
                     f"kinematics cannot tell it from a scale error{self._leaning(channel)}"
                 )
+        said += swings(self.estimate.faults)
         for signal in self.signals:
             if signal.held_rows:
                 said.append(

@@ -18,6 +18,7 @@ from ..vehicle import GRAVITY_MPS2
 from .kinematics.colour import neighbours
 from .kinematics.equations import Readings
 from .kinematics.motion import IntArray, Stretch
+from .kinematics.swing import with_swings
 
 MOVING = MEASURED  # channels of which the motion is made
 _SHORTEST_S = 3.0
@@ -161,7 +162,8 @@ def readings_of(logs: Sequence[Log], stretches: Sequence[Stretch]) -> list[Readi
                 f"{names}: {channel} holds only {joined.size} samples while the car moves; give a "
                 f"log with at least {_FEWEST}"
             )
-        result.append(Readings(channel, np.concatenate(at), np.concatenate(times), joined))
+        made = Readings(channel, np.concatenate(at), np.concatenate(times), joined)
+        result.append(with_swings(made) if channel == "ay_mps2" else made)
     return result
 
 
@@ -187,6 +189,7 @@ def averaged(readings: Readings, over_s: float) -> Readings:
         readings.stretch[last],
         readings.time_s[at].mean(axis=1),
         readings.values[at].mean(axis=1),
+        None if readings.swings is None else readings.swings[at].mean(axis=1),
     )
 
 

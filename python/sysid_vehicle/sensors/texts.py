@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+from .kinematics.equations import SWINGS
 
 DEG = math.pi / 180.0
 
@@ -33,6 +35,8 @@ _OTHER = {
     "arm_x": "an IMU ahead of the speed sensor",
     "arm_y": "an IMU left of the speed sensor",
     "turn": "a turned IMU",
+    "swing.slow": "an IMU above the speed sensor, on a body that rolls,",
+    "swing.quick": "an IMU above the speed sensor, on a body that rolls,",
     "lean.ax_mps2": "a body that pitches late",
     "lean.ay_mps2": "a body that rolls late",
 }
@@ -63,6 +67,15 @@ def why_not(
         return f"because {_NEEDS_EXCITATION[name]}"
     both = "; one of the two is there" if there else ""
     return f"because {_OTHER[other]} acts alike in this driving{both}"
+
+
+def swings(faults: Mapping[str, float]) -> tuple[str, ...]:
+    """What is said where the body's roll swings."""
+    said = (
+        "ay_mps2: the roll of the body swings, which an IMU feels that is higher or lower than the "
+        "speed sensor; the faults are told beside that"
+    )
+    return (said,) if {*SWINGS} & {*faults} else ()
 
 
 def gradient(gain: float) -> float:

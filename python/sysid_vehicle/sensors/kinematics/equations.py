@@ -7,12 +7,14 @@ Vehicle System Identification, ch. 10). No tyre, mass or inertia stands in it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from ..._common.arrays import FloatArray
+from ...vehicle import GRAVITY_MPS2
 from .motion import Basis, Grid, IntArray
 
 
@@ -51,6 +53,12 @@ class FaultKind:
 # How late gravity by roll and pitch comes after the acceleration: 2 D/w and more towards the body's
 # natural frequency, 1 to 2 Hz with a damping of 0.2 to 0.4.
 LEAN_S, LEAN_STD_S = 0.1, 0.06
+# Standard deviation of what an IMU feels of a roll that swings, per swing of the lateral
+# acceleration [s2]: roll of 4 degrees per g, an IMU half a metre above or below the speed sensor.
+SWING_STD_S2 = 0.5 * math.radians(4.0) / GRAVITY_MPS2
+SWINGS = {"swing.slow": 1.2, "swing.quick": 2.2}
+"""Faults by a body that swings, with natural frequencies that are spread as those of cars [Hz]."""
+
 FAULTS = {
     kind.name: kind
     for kind in (
@@ -69,6 +77,8 @@ FAULTS = {
         # A body leans later than its wheels are pushed, more or less than is usual.
         FaultKind("lean.ax_mps2", "ax_mps2", 1e3, LEAN_STD_S),
         FaultKind("lean.ay_mps2", "ay_mps2", 1e3, LEAN_STD_S),
+        # The body rolls as an oscillator, and an IMU above the speed sensor swings with it.
+        *(FaultKind(name, "ay_mps2", 1e3, SWING_STD_S2) for name in SWINGS),
     )
 }
 _SPEEDS = ("vx_mps", "vy_mps")  # of one device as a rule
@@ -95,12 +105,16 @@ class Readings:
         When it was written.
     values : ndarray, shape (n,)
         What was written; never NaN.
+    swings : ndarray, shape (n, len(SWINGS)), optional
+        Second derivatives of `values` as a body follows them that swings [1/s2], of an axis that
+        feels them (`swing`).
     """
 
     channel: str
     stretch: IntArray
     time_s: FloatArray
     values: FloatArray
+    swings: FloatArray | None = None
 
 
 def predict(
@@ -216,4 +230,8 @@ def _felt(
         "arm_y": -cx * dr - cy * r**2,
     }
     expected = cx * along + cy * across + level
+    if readings.swings is not None:
+        for name, swing in zip(SWINGS, readings.swings.T, strict=True):
+            expected = expected + faults.get(name, 0.0) * swing
+            by_fault[name] = swing
     return expected, blocks, by_fault, cx * d_along + cy * d_across + d_level

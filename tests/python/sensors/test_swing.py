@@ -1,0 +1,54 @@
+"""An IMU above the speed sensor on a body that rolls."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy
+
+import sysid_vehicle as sv
+
+G = 9.80665
+ROLL = 0.07  # rad per g
+_DELAYS = ("delay_vy_s", "delay_ay_s")
+
+
+def rolling(log: sv.Log, above_m: float, natural_hz: float, damping: float) -> sv.Log:
+    """What an IMU reads at this height above the speed sensor: g phi - l_z phi'' beside a_y."""
+    w = 2.0 * np.pi * natural_hz
+    t, ay = log["time_s"], log["ay_mps2"]
+    roll = scipy.signal.lti(
+        [[0.0, 0.0, w**2 * ROLL / G], [w**2 * ROLL / G, 0.0, 0.0]],
+        [1.0, 2.0 * damping * w, w**2],
+    ).to_ss()
+    phi, phi2 = np.asarray(scipy.signal.lsim(roll, ay, t)[1]).T
+    noise = np.random.default_rng(7).normal(0.0, 0.1, t.size)
+    return log.corrected({"ay_mps2": ay + G * phi - above_m * phi2 + noise}, [])
+
+
+@pytest.fixture(scope="module")
+def lap() -> sv.Log:
+    model = sv.Model(sv.example_vehicle())
+    quiet = sv.SensorNoise(ay_mps2=0.0)
+    return sv.drive(model, sv.manoeuvres.lap(60.0), noise=quiet, seed=11)
+
+
+@pytest.mark.parametrize(("natural_hz", "damping"), [(1.5, 0.25), (1.8, 0.35)])
+@pytest.mark.parametrize("above_m", [0.5, -0.3])
+def test_an_imu_at_another_height_is_no_other_fault(
+    lap: sv.Log, above_m: float, natural_hz: float, damping: float
+) -> None:
+    check = sv.check(rolling(lap, above_m, natural_hz, damping))
+    assert [fault.name for fault in check.found] == ["gain_ay"]
+    roll = check["gain_ay"]
+    assert abs(roll.value - ROLL) < 3.0 * roll.std
+    for name in (*_DELAYS, "gain_yaw_rate", "imu_forward_m"):
+        assert abs(check[name].value) < 3.0 * check[name].std
+    assert "the roll of the body swings" in str(check)
+
+
+def test_a_body_that_does_not_swing_is_not_said_to(lap: sv.Log) -> None:
+    noise = np.random.default_rng(7).normal(0.0, 0.1, lap["time_s"].size)
+    check = sv.check(lap.corrected({"ay_mps2": lap["ay_mps2"] + noise}, []))
+    assert check.found == ()
+    assert "swings" not in str(check)
