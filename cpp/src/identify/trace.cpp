@@ -243,8 +243,7 @@ Trace trace(const Problem& logged, const double* p, const FrozenFilter& filter) 
 void smoothed_means(const Problem& logged, const double* p, const Noise& noise, double* out) {
     const InTime in_time(logged, p);
     if (means_in_pieces(*in_time, p, noise, out)) return;
-    if (logged.samples() <= kToldSamples &&
-        means_along(*in_time, p, freeze(*in_time, p, noise), out))
+    if (logged.samples() <= kToldSamples && means_along(*in_time, p, freeze(logged, p, noise), out))
         return;
     const Trace told = trace(logged, p, noise, true);
     std::copy(told.state.begin(), told.state.end(), out);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -137,12 +138,18 @@ class Fit(Estimated):
             found.append(Estimate(what.name, value, std, unit, note, bounds=_OF_TYRES))
         return tuple(profiled(e, self.profiles) for e in found)
 
+    @cached_property
+    def _reached(self) -> dict[str, float]:
+        """Slip angles that the driving reached, by axle; unlimited where nobody knows."""
+        try:
+            most = reached(self.model, self.noise, self.driving)
+        except NumericalError:
+            most = (np.inf, np.inf)
+        return dict(zip(AXLES, most, strict=True))
+
     def _peaks_beyond(self, p: FloatArray) -> set[str]:
         """Names of what is told of peaks that lie beyond what the driving reached."""
-        try:
-            most = dict(zip(AXLES, reached(self.model, self.noise, self.driving), strict=True))
-        except NumericalError:
-            return set()
+        most = self._reached
         peaks = {axle: self.quantities[f"slip at the peak {axle}"].of(p) for axle in AXLES}
         far = [axle for axle in AXLES if not peaks[axle] <= most[axle]]
         return {f"{what} {axle}" for what in ("peak friction", "slip at the peak") for axle in far}

@@ -6,6 +6,7 @@ import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
 from ..estimate import Driving, NoiseModel
+from ..estimate.pieces import traces
 from ..model import Model
 from ..vehicle import slip_angles
 
@@ -23,7 +24,9 @@ def slips(model: Model, noise: NoiseModel, driving: Driving) -> FloatArray:
     NumericalError
         If the model cannot follow the driving.
     """
-    motion = driving.problem(model).trace(model.vector(), noise.vector(), False)["state"]
+    # By pieces: all that a filter tells of a long log is much more than its motion.
+    filtered = traces(driving.problem(model), model.vector(), noise.vector())
+    motion = np.concatenate([told["state"][:, :3] for _, told in filtered])
     least = min(log.least_speed_mps for log in driving.logs)
     vehicle, steer = model.vehicle, driving.channel("steer_rad")
     v_x, v_y, yaw_rate = np.maximum(motion[:, 0], least), motion[:, 1], motion[:, 2]

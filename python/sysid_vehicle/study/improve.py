@@ -152,7 +152,7 @@ def improve(
             ends=schedule.baseline,
         )
         room = _room(train_driving, rules)
-        found = Trail([baseline], short=room <= most_effects)
+        found = Trail([baseline], short=room <= wants.most_effects)
         with kept(found):
             say(f"Fitted the baseline to {train_driving}.")
             search = Search(

@@ -155,5 +155,18 @@ TEST(Told, TraceIsThatOfTheFilter) {
         }
 }
 
+TEST(Told, SmoothedMeansOfLateSteeringAreThoseOfTheSmoother) {
+    const Parameters p = typical_parameters();
+    const Problem problem = runs_of(mask_of({"steer_delay"}), 120);
+    ASSERT_NE(p[parameter_of("steer_delay")], 0.0);
+    const Trace smoothed = trace(problem, p.data(), ordinary_noise(), true);
+    std::vector<double> means(problem.samples() * kStatesFull);
+    smoothed_means(problem, p.data(), ordinary_noise(), means.data());
+    for (std::size_t i = 0; i < means.size(); ++i)
+        if (!std::isnan(means[i])) {
+            EXPECT_NEAR(means[i], smoothed.state[i], 1e-9 * (smoothed.state_std[i] + 1e-9)) << i;
+        }
+}
+
 }  // namespace
 }  // namespace sysid::test

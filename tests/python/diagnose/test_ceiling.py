@@ -28,7 +28,7 @@ def test_nothing_is_explainable_beside_the_right_model(fit: Fit, course: Log) ->
     found = ceiling(fit, course)
     assert [f.target for f in found.forces] == ["F_y", "M_z"]
     assert found.structure == ()
-    assert "disturbance" in str(found)
+    assert "no function of steering, speed and acceleration history is shown" in str(found)
 
 
 def test_disturbances_of_the_road_are_not_explainable(truth: Model, fit: Fit) -> None:

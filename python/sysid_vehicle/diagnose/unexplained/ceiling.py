@@ -92,8 +92,8 @@ class Ceiling:
             return f"a function of steering, speed and acceleration history explains {told}"
         most = max(self.forces, key=lambda f: f.share)
         return (
-            "no function of steering, speed and acceleration history explains what is missing (at "
-            f"best {most}): as far as this shows it is disturbance and noise"
+            "no function of steering, speed and acceleration history is shown to explain what is "
+            f"missing (at best {most})"
         )
 
     _repr_html_ = html_text

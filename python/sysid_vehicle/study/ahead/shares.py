@@ -115,8 +115,8 @@ class Shares:
         ]
         if not some:
             return (
-                "No function of the driving predicts the errors ahead better than the baseline: "
-                "as far as this shows they are disturbance and noise."
+                "No function of the driving is shown to predict the errors ahead better than the "
+                "baseline."
             )
         if not self.named:
             return (
