@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -31,6 +31,18 @@ from .search.tyre_shape import COMBINATIONS
 _MEANINGS = {"BCD": "cornering stiffness", "peak": "peak friction", "peak_slip": "slip at the peak"}
 _UNITS = {"cornering stiffness": "N/rad", "peak friction": "1", "slip at the peak": "rad"}
 _OF_TYRES = (0.0, float("inf"))  # no stiffness, friction or slip of a peak is negative
+
+
+_REACHED: WeakKeyDictionary[Fit, dict[str, float]] = WeakKeyDictionary()
+
+
+def _reached(fit: Fit) -> dict[str, float]:
+    """Slip angles that the driving reached, by axle; unlimited where nobody knows."""
+    try:
+        most = reached(fit.model, fit.noise, fit.driving)
+    except NumericalError:
+        most = (np.inf, np.inf)
+    return dict(zip(AXLES, most, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,18 +150,11 @@ class Fit(Estimated):
             found.append(Estimate(what.name, value, std, unit, note, bounds=_OF_TYRES))
         return tuple(profiled(e, self.profiles) for e in found)
 
-    @cached_property
-    def _reached(self) -> dict[str, float]:
-        """Slip angles that the driving reached, by axle; unlimited where nobody knows."""
-        try:
-            most = reached(self.model, self.noise, self.driving)
-        except NumericalError:
-            most = (np.inf, np.inf)
-        return dict(zip(AXLES, most, strict=True))
-
     def _peaks_beyond(self, p: FloatArray) -> set[str]:
         """Names of what is told of peaks that lie beyond what the driving reached."""
-        most = self._reached
+        if self not in _REACHED:
+            _REACHED[self] = _reached(self)
+        most = _REACHED[self]
         peaks = {axle: self.quantities[f"slip at the peak {axle}"].of(p) for axle in AXLES}
         far = [axle for axle in AXLES if not peaks[axle] <= most[axle]]
         return {f"{what} {axle}" for what in ("peak friction", "slip at the peak") for axle in far}
