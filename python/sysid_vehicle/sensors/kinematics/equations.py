@@ -106,8 +106,8 @@ class Readings:
     values : ndarray, shape (n,)
         What was written; never NaN.
     swings : ndarray, shape (n, len(SWINGS)), optional
-        Second derivatives of `values` as a body follows them that swings [1/s2], of an axis that
-        feels them (`swing`).
+        Second derivatives of `values` [m/s4] as a body follows them that swings, of an axis that
+        feels them (`swing.py`).
     """
 
     channel: str
