@@ -19,7 +19,7 @@ from .candidates.widened import widened
 from .change.change import Change
 from .change.changed import changed
 from .change.effect_change import EffectChange, LoadChange
-from .diagnose import diagnose
+from .diagnose import diagnose, with_unfollowed
 from .evidence.coordinates import blocks
 from .evidence.evidence import Evidence
 from .experiment.hiding import Bias, BiasReport, bias_report
@@ -90,4 +90,5 @@ __all__ = [
     "verdicts",
     "where",
     "widened",
+    "with_unfollowed",
 ]

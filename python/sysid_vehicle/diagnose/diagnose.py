@@ -6,6 +6,8 @@ import time
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from .._common.arguments import duration
 from .._common.threads import Workers
 from .._common.typed import typed
@@ -41,6 +43,7 @@ def diagnose(
     rules: Rules = USUAL,
     refits: int = REFITS,
     again: Collection[str] = (),
+    follow_all: bool = True,
     workers: int | None = None,
     time_limit_s: float | None = None,
     seed: int = 0,
@@ -69,6 +72,9 @@ def diagnose(
         of the model; such as those whose refits gained much in a poorer model: where a model is
         wrong in several ways, a refit may gain ten times what the score tells, as the noise that
         took up the effect is learned anew.
+    follow_all : bool
+        Whether what noise may hide is refitted to its maximum however far below the best effect it
+        ends. A search that adds the best one asks again beside it.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     time_limit_s : float, optional
@@ -109,20 +115,67 @@ def diagnose(
         chosen = Refitting(fit, driving, rules, again, pool, ends, progress)
         finished, far = chosen.leading([c for c in ranked if c.p_value < rules.alpha], refits)
         finished.sort(key=lambda c: -_merit(c, driving.samples))
+        unfollowed: tuple[str, ...] = ()
         if refits:
-            finished += chosen.beside_the_leading(ranked, finished, far, refits, left, board)
+            more, unfollowed = chosen.beside_the_leading(
+                ranked, finished, far, refits, left, board, follow_all
+            )
+            finished += more
             on_the_level = chosen.hidden_by_the_road(ranked, [*finished, *far])
             found = {c.id for c in on_the_level}
             finished = [*on_the_level, *(c for c in finished if c.id not in found)]
-        finished.sort(key=lambda c: -_merit(c, driving.samples))
-        finished = with_refit_rivals(finished, far, driving, rules, pool, ends)
-    done = {c.id for c in finished}
-    far = [c for c in far if c.id not in done]
-    done |= {c.id for c in far}
-    ranked = finished + far + [c for c in ranked if c.id not in done]
+        told = _told(finished, far, ranked, chosen)
     return _with_errors(
-        Diagnosis(fit, driving, tuple(ranked), left, rules, board.scores, family, proposed=proposed)
+        Diagnosis(
+            fit,
+            driving,
+            told,
+            left,
+            rules,
+            board.scores,
+            family,
+            proposed=proposed,
+            unfollowed=unfollowed,
+        )
     )
+
+
+def with_unfollowed(dx: Diagnosis, ends: float = np.inf) -> Diagnosis:
+    """The same with evidence for what it had not followed, as it came nowhere near the best effect.
+
+    Parameters
+    ----------
+    dx : Diagnosis
+    ends : float
+        When refits end [s of `time.perf_counter`].
+    """
+    with Workers(None) as pool:
+        chosen = Refitting(dx.fit, dx.driving, dx.rules, (), pool, ends, False)
+        more = chosen.hidden(dx.ranking, dx.unfollowed)
+        if not more:
+            return replace(dx, unfollowed=())
+        new = {c.id for c in more}
+        known = [c for c in dx.ranking if c.fit is not None and c.id not in new]
+        finished = [*more, *(c for c in known if c.finished)]
+        far = [c for c in known if not c.finished]
+        told = _told(finished, far, dx.ranking, chosen)
+    return _with_errors(replace(dx, ranking=told, unfollowed=()))
+
+
+def _told(
+    finished: Sequence[Candidate],
+    far: Sequence[Candidate],
+    ranked: Sequence[Candidate],
+    by: Refitting,
+) -> tuple[Candidate, ...]:
+    """All candidates, those with noise of their own first, with what cannot be told from each."""
+    samples = by.driving.samples
+    likeliest_first = sorted(finished, key=lambda c: -_merit(c, samples))
+    best = with_refit_rivals(likeliest_first, far, by.driving, by.rules, by.pool, by.ends)
+    done = {c.id for c in best}
+    poorer = [c for c in far if c.id not in done]
+    done |= {c.id for c in poorer}
+    return (*best, *poorer, *(c for c in ranked if c.id not in done))
 
 
 def _with_errors(dx: Diagnosis) -> Diagnosis:

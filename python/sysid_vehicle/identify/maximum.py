@@ -28,7 +28,8 @@ _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 _FAR_BELOW_BY_FEW = 50.0  # nats on few samples, chosen as `FAR_BELOW`
-_CLIMBS = 4.0  # nats, most by which a lag was seen to climb from where it settled (`FAR_BELOW`)
+# Nats, most by which a lag, and any effect, was seen to climb from where it settled (`FAR_BELOW`).
+_CLIMBS, _ANY_CLIMBS = 4.0, 100.0
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
 # Nats, and standard errors, between maxima that are one: climbs end so far from each other.
 _SAME, _NEAR = 0.5, 0.5
@@ -61,8 +62,10 @@ def far_below(log_likelihood: float, least: float) -> bool:
     return log_likelihood < least - FAR_BELOW
 
 
-def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.inf) -> Fit | None:
-    """As `refine` under the noise of a poorer fit; None where it ends far below that.
+def refine_above(
+    model: Model, driving: Driving, fit: Fit, least: float = -np.inf, rival: Fit | None = None
+) -> Fit | None:
+    """As `refine` under the noise of a poorer fit; None where it ends far below that, or a rival.
 
     Few samples, which lead the search most of the way, tell it before all of them are asked.
 
@@ -76,13 +79,18 @@ def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.in
     least : float
         Log-likelihood below which nobody asks for the maximum: where neither noise of its own nor
         a climb leads up to that it is not sought, nor where few samples lead to no lag.
+    rival : Fit, optional
+        With another effect. By inputs as they were measured: exact ones may change it by some 50.
     """
     objective, thinned = objectives(model, driving)
     box, begin = free_box(model), (model.vector(), fit.noise.vector())
     led = None
     if thinned:
         led = settle(thinned[-1], *begin, box, thin=thinned[:-1])[:2]
-        if thinned[-1].log_likelihood(*led) < _by_few(fit, objective) - _FAR_BELOW_BY_FEW:
+        reached = thinned[-1].log_likelihood(*led)
+        if reached < _by_few(fit, objective) - _FAR_BELOW_BY_FEW:
+            return None
+        if rival is not None and reached < _by_few(rival, objective) - _ANY_CLIMBS:
             return None
         new = np.array([n not in fit.model.free_names for n in model.free_names])
         # Few samples lead to no lag, which is the poorer model: from there no search leads back.
@@ -91,6 +99,8 @@ def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.in
         if none and led_on and least > fit.log_likelihood:
             return None
     lowest = max(least - _CLIMBS, fit.log_likelihood - FAR_BELOW)
+    if rival is not None:
+        lowest = max(lowest, rival.log_likelihood - _ANY_CLIMBS)
     found = settle(objective, *begin, box, led=led, least=least - _CLIMBS)
     if log_likelihood_of(objective, *found[:2]) < lowest:
         return None
@@ -226,7 +236,8 @@ def polish(
 ) -> Fit:
     """Noise and parameters of maximum likelihood, from values that are already near."""
     objective, thinned = objectives(model, driving, inputs)
-    found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
+    lowest = least - FAR_BELOW - _ANY_CLIMBS
+    found = settle(objective, p, noise.vector(), free_box(model), thin=thinned, least=lowest)
     return top(model, driving, objective, found, starts, thinned, least)
 
 

@@ -54,6 +54,9 @@ class Diagnosis(Printed):
         One-step-ahead error on the driving without any of the effects, in units of `floor`.
     proposed : Causes
         Posterior of a sum of single effects over the scores, linearised at the fit; see `causes`.
+    unfollowed : tuple of str
+        What noise may hide and comes nowhere near the best effect, where a search asked for no
+        more: their scores stand (`with_unfollowed`).
     """
 
     fit: Fit
@@ -65,6 +68,7 @@ class Diagnosis(Printed):
     family: dict[str, float]
     error: float = float("nan")
     proposed: Causes = field(default_factory=lambda: Causes({}, (), {}))
+    unfollowed: tuple[str, ...] = ()
 
     @cached_property
     def causes(self) -> Causes:

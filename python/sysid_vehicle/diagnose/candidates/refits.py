@@ -61,14 +61,15 @@ def in_time(
     return lambda c: before(ends, lambda: work(c), c)
 
 
-def finished(fit: Fit, c: Candidate) -> Candidate:
+def finished(fit: Fit, c: Candidate, least: float = -np.inf) -> Candidate:
     """The candidate with noise of its own, unless that makes it worse than the model without it.
 
-    A lag at its smallest is not quite none.
+    A lag at its smallest is not quite none. `least` is a log-likelihood below which nobody asks for
+    the maximum: what ends far below that has a fit that has not converged.
     """
     if c.fit is None:
         return c
-    found = _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
+    found = _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise, least=least))
     if found.statistic < 0.0 <= c.statistic:
         found = c
     return replace(found, finished=True)
@@ -83,21 +84,29 @@ def is_hidden_by_noise(effect: Effect) -> bool:
     return effect.scored_at_typical and len(effect.parameters) == 1
 
 
-def from_typical(fit: Fit, c: Candidate, tests: int, alpha: float = np.inf) -> Candidate:
+def from_typical(
+    fit: Fit, c: Candidate, tests: int, alpha: float, rival: Fit | None = None
+) -> Candidate:
     """The candidate fitted with noise of its own from its typical size (`from_size`)."""
     ((name, p),) = c.effect.named.items()
     asked = alpha if is_hidden_by_noise(c.effect) else np.inf
-    return from_size(fit, c, {name: p.typical}, tests, asked)
+    return from_size(fit, c, {name: p.typical}, tests, asked, rival)
 
 
 def from_size(
-    fit: Fit, c: Candidate, size: Mapping[str, float], tests: int, alpha: float = np.inf
+    fit: Fit,
+    c: Candidate,
+    size: Mapping[str, float],
+    tests: int,
+    alpha: float = np.inf,
+    rival: Fit | None = None,
 ) -> Candidate:
     """The candidate fitted with noise of its own from a size, and tested by likelihood.
 
     Its p-value is that of the likelihood ratio, on one side where its only parameter has one sign,
     over the variance ratio of its score, corrected for so many tests (Bonferroni). Where that comes
-    out above `alpha` the candidate may be left as it is: what ends at nothing is not climbed.
+    out above `alpha`, or it ends far below a rival, the candidate may be left as it is: what ends
+    at nothing is not climbed.
     """
     parameters = c.effect.parameters
     sides = 0.5 if len(parameters) == 1 and parameters[0].one_sided else 1.0
@@ -109,7 +118,7 @@ def from_size(
         )
     try:
         model = fit.model.add(c.effect).with_values(size)
-        likelier = refine_above(model, fit.driving, fit, least)
+        likelier = refine_above(model, fit.driving, fit, least, rival)
     except (NumericalError, np.linalg.LinAlgError):
         return c
     if likelier is None:

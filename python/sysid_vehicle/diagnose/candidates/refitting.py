@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +35,7 @@ _HOPELESS = 0.15
 _HOPELESS_WITH_STATES = 0.6
 _RIVALS = 0.3  # of the score of the best, with which one that acts like it may overtake it
 _NEAR = 0.4  # of the best refit, with which one is finished with noise of its own
+_FOLLOWED = 1  # to its maximum, however far below the best one it ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +96,8 @@ class Refitting:
         most: int,
         left: Omnibus,
         board: ScoreBoard,
-    ) -> list[Candidate]:
+        follow_all: bool,
+    ) -> tuple[list[Candidate], tuple[str, ...]]:
         """Refits of rivals of the best one, and of what no score shows, all side by side.
 
         Parameters
@@ -109,19 +111,44 @@ class Refitting:
         left : Omnibus
             Of the fit.
         board : ScoreBoard
+        follow_all : bool
+            Whether what no score shows is followed that comes nowhere near the best one.
+
+        Returns
+        -------
+        refitted : list of Candidate
+        unfollowed : tuple of str
+            `hidden` tells whether there is evidence for them.
         """
         if time.perf_counter() >= self.ends:
-            return []
+            return [], ()
         rivals = _rivals_of_the_best(ranked, known, far, most)
-        hidden, work = self._hidden(ranked, known, left, board)
-        again = in_time(lambda c: refitted(self.fit, self.driving, c), self.ends)
-        end = in_time(lambda c: finished(self.fit, c), self.ends)
         asked = {c.id for c in rivals}
-        jobs: list[tuple[Callable[[Candidate], Candidate | None], Candidate]] = []
+        hidden = [c for c in self._hidden(ranked, known, left, board) if c.id not in asked]
+        best = max((c.fit for c in known if c.fit), key=lambda f: f.log_likelihood, default=None)
+        again = in_time(lambda c: refitted(self.fit, self.driving, c), self.ends)
+        end = self._at_its_maximum(-np.inf if best is None else best.log_likelihood)
+        shown = self._shown(len(ranked), None if follow_all else best)
+        jobs: list[tuple[Callable[[Candidate], Candidate], Candidate]] = []
         jobs += [(lambda c: end(again(c)), c) for c in rivals]
-        jobs += [(work, c) for c in hidden if c.id not in asked]
-        tried = self.pool.map(lambda job: job[0](job[1]), jobs)
-        return [c for c in tried if c is not None and c.fit is not None]
+        jobs += [(shown, c) for c in hidden]
+        tried = list(self.pool.map(lambda job: job[0](job[1]), jobs))
+        found = [c for c in tried[: len(rivals)] if c.fit is not None]
+        found += self._significant(tried[len(rivals) :])
+        unfollowed = [c.id for c in tried[len(rivals) :] if not c.finished]
+        return found, () if follow_all or best is None else tuple(unfollowed)
+
+    def hidden(self, ranked: Sequence[Candidate], names: Collection[str]) -> list[Candidate]:
+        """Refits of what no score shows, where they are evidence, whatever else there is."""
+        work = self._shown(len(ranked), None)
+        return self._significant(self.pool.map(work, [c for c in ranked if c.id in names]))
+
+    def _shown(self, tests: int, rival: Fit | None) -> Callable[[Candidate], Candidate]:
+        alpha = self.rules.alpha
+        return in_time(lambda c: from_typical(self.fit, c, tests, alpha, rival), self.ends)
+
+    def _significant(self, tried: Iterable[Candidate]) -> list[Candidate]:
+        return [c for c in tried if c.finished and c.p_value < self.rules.alpha]
 
     def _hidden(
         self,
@@ -129,22 +156,14 @@ class Refitting:
         known: Sequence[Candidate],
         left: Omnibus,
         board: ScoreBoard,
-    ) -> tuple[list[Candidate], Callable[[Candidate], Candidate | None]]:
-        """What noise or tyres that are wrong may hide, and its refit from its typical size."""
-        n, rules = len(ranked), self.rules
+    ) -> list[Candidate]:
+        """What noise or tyres that are wrong may hide."""
         done = {c.id for c in known}
         hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in done]
         hidden += _hidden_by_tyres(ranked, known)
-        alpha = rules.alpha if hidden and self._leaves_more(known[:1], left) else np.inf
-        if alpha == np.inf:
-            hidden = _suspected(hidden, known, board, rules)
-        work = in_time(lambda c: from_typical(self.fit, c, n, alpha), self.ends)
-
-        def shown(c: Candidate) -> Candidate | None:
-            tried = work(c)
-            return tried if tried.finished and (tried.p_value < alpha) else None
-
-        return hidden, shown
+        if hidden and not self._leaves_more(known[:1], left):
+            return _suspected(hidden, known, board, self.rules)
+        return hidden
 
     def hidden_by_the_road(
         self, ranked: Sequence[Candidate], known: Sequence[Candidate]
@@ -162,7 +181,7 @@ class Refitting:
         n, alpha = len(ranked), self.rules.alpha
         work = in_time(lambda c: from_size(self.fit, c, predicted_size(c), n, alpha), self.ends)
         best = {c.id: c.statistic for c in known}
-        tried = [c for c in self.pool.map(work, asked) if c.finished and c.p_value < alpha]
+        tried = self._significant(self.pool.map(work, asked))
         return [c for c in tried if c.statistic > best.get(c.id, 0.0)]
 
     def _worth_refitting(self, significant: Sequence[Candidate], refits: int) -> list[Candidate]:
@@ -201,12 +220,19 @@ class Refitting:
         for c in tried:
             top[c.effect.along_alone] = max(top.get(c.effect.along_alone, 0.0), c.statistic)
         near = [c for c in tried if c.statistic > _NEAR * top[c.effect.along_alone]]
-        done = list(self.pool.map(in_time(lambda c: finished(self.fit, c), self.ends), near))
+        near.sort(key=lambda c: -c.statistic)
+        # As many as are followed in any case tell how far the others have to come.
+        done = list(self.pool.map(self._at_its_maximum(), near[:_FOLLOWED]))
+        least = max((c.fit.log_likelihood for c in done if c.fit), default=-np.inf)
+        done += self.pool.map(self._at_its_maximum(least), near[_FOLLOWED:])
         if any(c is begun and c.fit for c, begun in zip(done, near, strict=True)):
             done = near  # with noise of their own only some would seem the likelier ones
         ids = {c.id for c in done}
         far = sorted((c for c in tried if c.id not in ids), key=lambda c: -c.statistic)
         return done, far
+
+    def _at_its_maximum(self, least: float = -np.inf) -> Callable[[Candidate], Candidate]:
+        return in_time(lambda c: finished(self.fit, c, least), self.ends)
 
     def _leaves_more(self, best: Sequence[Candidate], left: Omnibus) -> bool:
         """Whether something is left with the best candidate, or where there is none."""

@@ -139,6 +139,8 @@ def settle(
             p, noise, steps = near, told, 3
     best = -np.inf
     gains = objective.freeze(p, noise)
+    if steps < 6 and least > -np.inf and _hopeless(objective, least, p, gains, noise)[0]:
+        return p, noise, False
     for _ in range(rounds):
         learned = objective.learn_noise(p, noise, rounds=steps, enough=_LITTLE)
         steps = 3

@@ -20,6 +20,7 @@ from ...diagnose import (
     beside_what_they_refine,
     diagnose,
     omnibus,
+    with_unfollowed,
 )
 from ...diagnose.diagnose import REFITS
 from ...effects import Effect
@@ -214,12 +215,11 @@ class Search:
             if not in_time:
                 trail.stopped = tuple(c.id for c in dx.significant)
                 return
-            # What was refitted is not lost; what takes further refits waits for another study.
-            step, by = None, (self.ends, self.judged_by)
-            if self.most_effects:
-                step = first_that_holds(dx, trail.fit, self.test, *by)
-            single = None if step is None else step[1]
-            several = first_together(dx, self.test, single, self.most_effects, *by)
+            step, several = self._that_hold(dx)
+            if step is None and several is None and dx.unfollowed:
+                # Where the best effect does not hold another may, however little it gains.
+                dx = trail.diagnoses[-1] = with_unfollowed(dx, self.ends)
+                step, several = self._that_hold(dx)
             if step is None and several is None:
                 step = before(self.ends, partial(self._beside_another, dx, trail), None)
             if several is not None:
@@ -252,6 +252,19 @@ class Search:
             known = set(trail.fit.model.effects)
             trail.fits.append(found)
             self.say(_step(found, known))
+
+    def _that_hold(
+        self, dx: Diagnosis
+    ) -> tuple[tuple[Candidate, Fit] | None, tuple[tuple[str, ...], Fit] | None]:
+        """The single effect to add, and the several together; None where none holds.
+
+        What was refitted is not lost; what takes further refits waits for another study.
+        """
+        step, by = None, (self.ends, self.judged_by)
+        if self.most_effects:
+            step = first_that_holds(dx, dx.fit, self.test, *by)
+        single = None if step is None else step[1]
+        return step, first_together(dx, self.test, single, self.most_effects, *by)
 
     def take_out_harmful(self, trail: Trail) -> None:
         """Take effects out of the last model with which errors ahead are shown to be larger.
@@ -330,6 +343,7 @@ class Search:
             rules=self.rules,
             refits=refits if left > 0.0 else 0,
             again=again if left > 0.0 else (),
+            follow_all=False,
             time_limit_s=left if left > 0.0 else None,
             seed=self.seed,
             progress=self.progress,

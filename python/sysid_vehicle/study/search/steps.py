@@ -12,6 +12,7 @@ from ..._common.memo import remembered
 from ..._common.threads import before, in_parallel
 from ...diagnose import Candidate, Diagnosis, refused
 from ...diagnose.candidates.possible import possible_in
+from ...diagnose.candidates.refits import finished
 from ...effects import Parameter
 from ...errors import NumericalError
 from ...estimate import Driving
@@ -58,6 +59,7 @@ def first_that_holds(
             c.id not in first.indistinguishable_from or _can_be(c, rules) != _can_be(first, rules)
         ):
             continue
+        c = before(ends, partial(_at_its_maximum, dx, c), c)
         if c.fit is None or not _sound(c, rules):
             continue
         # Validation data come first: what they do not confirm need not be made simpler.
@@ -76,6 +78,14 @@ def first_that_holds(
         return None
     _, chosen, lean = max(holding.values(), key=lambda h: h[0])
     return chosen, lean
+
+
+def _at_its_maximum(dx: Diagnosis, c: Candidate) -> Candidate:
+    """The candidate with its fit at the maximum: the diagnosis leaves those far below the best."""
+    if c.fit is None or c.fit.converged or not c.finished:
+        return c
+    best = max(o.fit.log_likelihood for o in dx.ranking if o.finished and o.fit is not None)
+    return finished(dx.fit, c) if far_below(c.fit.log_likelihood, best) else c
 
 
 def likeliest(dx: Diagnosis) -> Candidate | None:
