@@ -85,7 +85,7 @@ def is_hidden_by_noise(effect: Effect) -> bool:
 
 
 def from_typical(
-    fit: Fit, c: Candidate, tests: int, alpha: float, rival: Fit | None = None
+    fit: Fit, c: Candidate, tests: int, alpha: float = np.inf, rival: Fit | None = None
 ) -> Candidate:
     """The candidate fitted with noise of its own from its typical size (`from_size`)."""
     ((name, p),) = c.effect.named.items()

@@ -1,0 +1,147 @@
+"""What ends far below the best effect is not followed, and asked for where that does not hold."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle.diagnose import with_unfollowed
+from sysid_vehicle.diagnose.candidates import refitting
+from sysid_vehicle.diagnose.candidates.candidate import Candidate
+from sysid_vehicle.diagnose.candidates.refits import finished, refitted
+from sysid_vehicle.identify import far_below, maximum, refine_above
+from sysid_vehicle.study.search import steps
+
+BEST, POORER, HIDDEN = "speed_sensor_misalignment", "side_wind", "tyre_relaxation"
+
+
+@pytest.fixture(scope="module")
+def lacking(truth: Model, start: Model) -> Fit:
+    """The baseline on so many samples, of a car whose speed sensor is turned, that fewer lead."""
+    car = truth.add(BEST).with_values({f"{BEST}.angle_rad": 0.03})
+    return identify(start, drive(car, manoeuvres.lap(32.0), seed=8), starts=1)
+
+
+@pytest.fixture(scope="module")
+def dx(lacking: Fit) -> Diagnosis:
+    return diagnose(lacking, candidates=(BEST, POORER))
+
+
+@pytest.fixture(scope="module")
+def best(dx: Diagnosis) -> Fit:
+    assert dx.ranking[0].id == BEST
+    fit = dx.ranking[0].fit
+    assert fit is not None
+    assert fit.converged
+    return fit
+
+
+@pytest.fixture(scope="module")
+def left(lacking: Fit, dx: Diagnosis, best: Fit) -> Candidate:
+    """The poorer candidate, as a diagnosis leaves it."""
+    (c,) = (c for c in dx.ranking if c.id == POORER)
+    begun = refitted(lacking, lacking.driving, c)
+    return finished(lacking, begun, best.log_likelihood)
+
+
+def test_what_is_left_says_that_it_has_not_converged(
+    lacking: Fit, best: Fit, left: Candidate
+) -> None:
+    whole = finished(lacking, left)
+    assert left.finished
+    assert left.fit is not None
+    assert whole.fit is not None
+    assert not left.fit.converged
+    assert whole.fit.converged
+    assert lacking.log_likelihood < left.fit.log_likelihood <= whole.fit.log_likelihood
+    assert far_below(whole.fit.log_likelihood, best.log_likelihood)
+
+
+def test_a_candidate_that_was_left_is_judged_at_its_maximum(
+    dx: Diagnosis, left: Candidate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where validation data refuse the best effect they are asked of the next one."""
+    judged: list[Fit] = []
+
+    def refuses(fit: Fit, found: Fit, *args: object) -> None:
+        judged.append(found)
+
+    monkeypatch.setattr(steps, "speaks_for", refuses)
+    both = replace(dx, ranking=(dx.ranking[0], replace(left, p_value=0.0)))
+    assert steps.first_that_holds(both, dx.fit, dx.driving) is None
+    assert [f.model.effects for f in judged] == [(BEST,), (POORER,)]
+    assert all(f.converged for f in judged)
+
+
+def test_the_best_alone_is_followed_in_any_case(
+    lacking: Fit, best: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[str, float]] = []
+
+    def noted(fit: Fit, c: Candidate, least: float = -np.inf) -> Candidate:
+        asked.append((c.id, least))
+        return finished(fit, c, least)
+
+    monkeypatch.setattr(refitting, "finished", noted)
+    monkeypatch.setattr(refitting, "_NEAR", 0.0)
+    monkeypatch.setattr(refitting, "_HOPELESS", 0.0)
+    diagnose(lacking, candidates=(BEST, POORER), workers=1)
+    assert asked == [(BEST, -np.inf), (POORER, best.log_likelihood)]
+
+
+def test_a_lag_below_a_rival_ends_on_few_samples(
+    lacking: Fit, best: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = lacking.model.add(HIDDEN).with_values({f"{HIDDEN}.relaxation_length_m": 0.5})
+    asked: list[int] = []
+    settle = maximum.settle
+
+    def counted(objective: Any, *args: Any, **kwargs: Any) -> Any:
+        asked.append(objective.samples)
+        return settle(objective, *args, **kwargs)
+
+    monkeypatch.setattr(maximum, "settle", counted)
+    assert refine_above(model, lacking.driving, lacking, rival=best) is None
+    assert max(asked) < lacking.driving.samples
+    # Without a rival it is followed to where it has gained what it can.
+    assert refine_above(model, lacking.driving, lacking) is not None
+    assert max(asked) == lacking.driving.samples
+
+
+def test_a_hidden_lag_that_was_not_followed_is_found_when_asked_for(
+    truth: Model, start: Model
+) -> None:
+    car = truth.add(HIDDEN).with_values({f"{HIDDEN}.relaxation_length_m": 0.7})
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    scored = diagnose(fit, candidates=("aero_drag", HIDDEN), refits=0)
+    found = with_unfollowed(replace(scored, unfollowed=(HIDDEN,)))
+    assert not found.unfollowed
+    assert [c.id for c in found.significant] == [HIDDEN]
+    assert {c.id for c in found.ranking} == {"aero_drag", HIDDEN}
+    assert found.ranking[0].finished
+    assert abs(found.ranking[0].value[0] - 0.7) < 4.0 * found.ranking[0].std[0]
+    # What is not there leaves the diagnosis as it was.
+    none = with_unfollowed(replace(scored, unfollowed=("steer_lag",)))
+    assert none.ranking == scored.ranking
+
+
+def test_a_search_names_what_it_has_not_followed(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lag that comes nowhere near the best effect, and that noise may hide."""
+    fit = identify(start, drive(truth, manoeuvres.lap(15.0), seed=3), starts=1)
+    names = ("aero_drag", "steer_lag")
+    followed = diagnose(fit, candidates=names, follow_all=True)
+    assert not followed.unfollowed
+    (drag,) = (c for c in followed.ranking if c.id == "aero_drag")
+    led = replace(drag, fit=fit, finished=True, p_value=0.0)
+
+    def leading(*args: object) -> tuple[list[Candidate], list[Candidate]]:
+        return [led], []
+
+    monkeypatch.setattr(refitting.Refitting, "leading", leading)
+    monkeypatch.setattr(refitting.Refitting, "_leaves_more", lambda *args: True)
+    assert diagnose(fit, candidates=names, follow_all=False).unfollowed == ("steer_lag",)
+    assert diagnose(fit, candidates=names).unfollowed == ()
