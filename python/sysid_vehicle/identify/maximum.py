@@ -27,7 +27,7 @@ _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
-_FAR_BELOW_BY_FEW = 50.0  # nats on few samples, chosen as `FAR_BELOW`
+_FAR_BELOW_BY_FEW = 50.0  # nats, chosen as `FAR_BELOW`
 # Nats, most by which a lag, and any effect, was seen to climb from where it settled (`FAR_BELOW`).
 _CLIMBS, _ANY_CLIMBS = 4.0, 100.0
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
@@ -65,7 +65,7 @@ def far_below(log_likelihood: float, least: float) -> bool:
 def refine_above(
     model: Model, driving: Driving, fit: Fit, least: float = -np.inf, rival: Fit | None = None
 ) -> Fit | None:
-    """As `refine` under the noise of a poorer fit; None where it ends far below that, or a rival.
+    """As `refine` under the noise of a poorer fit; None where it ends far below that.
 
     Few samples, which lead the search most of the way, tell it before all of them are asked.
 
@@ -80,17 +80,19 @@ def refine_above(
         Log-likelihood below which nobody asks for the maximum: where neither noise of its own nor
         a climb leads up to that it is not sought, nor where few samples lead to no lag.
     rival : Fit, optional
-        With another effect. By inputs as they were measured: exact ones may change it by some 50.
+        With another effect. What ends far below that has not converged.
     """
     objective, thinned = objectives(model, driving)
     box, begin = free_box(model), (model.vector(), fit.noise.vector())
-    led = None
+    starts, led = Starts.none(model.free_names), None
+
+    def as_it_is(p: FloatArray, v: FloatArray) -> Fit:
+        return summary(model, driving, objective, p, NoiseModel.from_vector(v), starts, False)
+
     if thinned:
         led = settle(thinned[-1], *begin, box, thin=thinned[:-1])[:2]
         reached = thinned[-1].log_likelihood(*led)
         if reached < _by_few(fit, objective) - _FAR_BELOW_BY_FEW:
-            return None
-        if rival is not None and reached < _by_few(rival, objective) - _ANY_CLIMBS:
             return None
         new = np.array([n not in fit.model.free_names for n in model.free_names])
         # Few samples lead to no lag, which is the poorer model: from there no search leads back.
@@ -98,13 +100,16 @@ def refine_above(
         led_on = log_likelihood_of(objective, *led) > log_likelihood_of(objective, *begin)
         if none and led_on and least > fit.log_likelihood:
             return None
+        if rival is not None and reached < _by_few(rival, objective) - _ANY_CLIMBS:
+            return as_it_is(*led)
     lowest = max(least - _CLIMBS, fit.log_likelihood - FAR_BELOW)
-    if rival is not None:
-        lowest = max(lowest, rival.log_likelihood - _ANY_CLIMBS)
-    found = settle(objective, *begin, box, led=led, least=least - _CLIMBS)
-    if log_likelihood_of(objective, *found[:2]) < lowest:
+    p, noise, converged = settle(objective, *begin, box, led=led, least=least - _CLIMBS)
+    reached = log_likelihood_of(objective, p, noise)
+    if reached < lowest:
         return None
-    return top(model, driving, objective, found, Starts.none(model.free_names), thinned)
+    if rival is not None and reached < rival.log_likelihood - _ANY_CLIMBS:
+        return as_it_is(p, noise)
+    return top(model, driving, objective, (p, noise, converged), starts, thinned)
 
 
 def refine_beside(
@@ -236,8 +241,8 @@ def polish(
 ) -> Fit:
     """Noise and parameters of maximum likelihood, from values that are already near."""
     objective, thinned = objectives(model, driving, inputs)
-    lowest = least - FAR_BELOW - _ANY_CLIMBS
-    found = settle(objective, p, noise.vector(), free_box(model), thin=thinned, least=lowest)
+    box, lowest = free_box(model), least - FAR_BELOW - _ANY_CLIMBS
+    found = settle(objective, p, noise.vector(), box, thin=thinned, least=lowest)
     return top(model, driving, objective, found, starts, thinned, least)
 
 
@@ -275,8 +280,8 @@ def top(
     """
     at_top = to_the_top(objective, *settled[:2], free_box(model), least=least - FAR_BELOW)
     if far_below(log_likelihood_of(objective, *at_top), least):
-        told = NoiseModel.from_vector(at_top[1])
-        return summary(model, driving, objective, at_top[0], told, starts, False)
+        p, told = at_top[0], NoiseModel.from_vector(at_top[1])
+        return summary(model, driving, objective, p, told, starts, False)
     return _likeliest(model, driving, objective, at_top, starts, thinned, settled[2])
 
 
@@ -332,7 +337,6 @@ def on_its_road(fit: Fit) -> Fit:
     """The same fit where the road is level, another where its slope varies."""
     model, driving, p = fit.model, fit.driving, fit.model.vector()
     objective = objective_of(model, driving.problem(model), driving)
-
     sloping = [replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2]
     values = [log_likelihood_of(objective, p, noise.vector()) for noise in sloping]
     best = sloping[int(np.argmax(values))]

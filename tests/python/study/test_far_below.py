@@ -103,8 +103,11 @@ def test_a_lag_below_a_rival_ends_on_few_samples(
         return settle(objective, *args, **kwargs)
 
     monkeypatch.setattr(maximum, "settle", counted)
-    assert refine_above(model, lacking.driving, lacking, rival=best) is None
+    found = refine_above(model, lacking.driving, lacking, rival=best)
     assert max(asked) < lacking.driving.samples
+    assert found is not None
+    assert not found.converged
+    assert far_below(found.log_likelihood, best.log_likelihood)
     # Without a rival it is followed to where it has gained what it can.
     assert refine_above(model, lacking.driving, lacking) is not None
     assert max(asked) == lacking.driving.samples

@@ -14,6 +14,7 @@ from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import (
     Fit,
+    far_below,
     lost_to_input_noise,
     refine,
     refine_above,
@@ -105,8 +106,8 @@ def from_size(
 
     Its p-value is that of the likelihood ratio, on one side where its only parameter has one sign,
     over the variance ratio of its score, corrected for so many tests (Bonferroni). Where that comes
-    out above `alpha`, or it ends far below a rival, the candidate may be left as it is: what ends
-    at nothing is not climbed.
+    out above `alpha` the candidate may be left as it is: what ends at nothing is not climbed. One
+    that ends far below a rival is not finished, and its fit has not converged.
     """
     parameters = c.effect.parameters
     sides = 0.5 if len(parameters) == 1 and parameters[0].one_sided else 1.0
@@ -123,6 +124,9 @@ def from_size(
         return c
     if likelier is None:
         return c
+    least = -np.inf if rival is None else rival.log_likelihood
+    if not likelier.converged and far_below(likelier.log_likelihood, least):
+        return replace(c, fit=likelier)
     found = _with_fit(fit, c, likelier)
     alone = sides * float(scipy.special.chdtrc(degrees, max(found.statistic, 0.0) / ratio))
     return replace(found, finished=True, p_value=min(tests * alone, 1.0))

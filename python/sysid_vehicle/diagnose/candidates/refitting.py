@@ -135,8 +135,8 @@ class Refitting:
         tried = list(self.pool.map(lambda job: job[0](job[1]), jobs))
         found = [c for c in tried[: len(rivals)] if c.fit is not None]
         found += self._significant(tried[len(rivals) :])
-        unfollowed = [c.id for c in tried[len(rivals) :] if not c.finished]
-        return found, () if follow_all or best is None else tuple(unfollowed)
+        unfollowed = [c.id for c in tried[len(rivals) :] if c.fit is not None and not c.finished]
+        return found, tuple(unfollowed)
 
     def hidden(self, ranked: Sequence[Candidate], names: Collection[str]) -> list[Candidate]:
         """Refits of what no score shows, where they are evidence, whatever else there is."""

@@ -218,8 +218,10 @@ class Search:
             step, several = self._that_hold(dx)
             if step is None and several is None and dx.unfollowed:
                 # Where the best effect does not hold another may, however little it gains.
-                dx = trail.diagnoses[-1] = with_unfollowed(dx, self.ends)
-                step, several = self._that_hold(dx)
+                ranking, dx = dx.ranking, with_unfollowed(dx, self.ends)
+                trail.diagnoses[-1] = dx
+                if dx.ranking is not ranking:
+                    step, several = self._that_hold(dx)
             if step is None and several is None:
                 step = before(self.ends, partial(self._beside_another, dx, trail), None)
             if several is not None:
