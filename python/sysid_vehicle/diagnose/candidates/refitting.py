@@ -35,7 +35,6 @@ _HOPELESS = 0.15
 _HOPELESS_WITH_STATES = 0.6
 _RIVALS = 0.3  # of the score of the best, with which one that acts like it may overtake it
 _NEAR = 0.4  # of the best refit, with which one is finished with noise of its own
-_FOLLOWED = 1  # to its maximum, however far below the best one it ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,10 +220,10 @@ class Refitting:
             top[c.effect.along_alone] = max(top.get(c.effect.along_alone, 0.0), c.statistic)
         near = [c for c in tried if c.statistic > _NEAR * top[c.effect.along_alone]]
         near.sort(key=lambda c: -c.statistic)
-        # As many as are followed in any case tell how far the others have to come.
-        done = list(self.pool.map(self._at_its_maximum(), near[:_FOLLOWED]))
+        # The first one tells how far the others have to come.
+        done = list(map(self._at_its_maximum(), near[:1]))
         least = max((c.fit.log_likelihood for c in done if c.fit), default=-np.inf)
-        done += self.pool.map(self._at_its_maximum(least), near[_FOLLOWED:])
+        done += self.pool.map(self._at_its_maximum(least), near[1:])
         if any(c is begun and c.fit for c, begun in zip(done, near, strict=True)):
             done = near  # with noise of their own only some would seem the likelier ones
         ids = {c.id for c in done}
