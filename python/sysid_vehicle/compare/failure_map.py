@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,12 @@ if TYPE_CHECKING:
 _FEWEST = 20  # samples that make a cell worth showing
 
 
+def _range(ends: tuple[float, float], least: int, sign: str = "") -> str:
+    """Both ends, with so many digits that they differ: the cells of a model car are narrow."""
+    digits = max(least, -math.floor(math.log10(ends[1] - ends[0])))
+    return f"{ends[0]:{sign}.{digits}f} to {ends[1]:{sign}.{digits}f}"
+
+
 @dataclass(frozen=True)
 class Region:
     """A part of the operating range, and its share of the error above the noise floor."""
@@ -28,8 +35,8 @@ class Region:
 
     def __str__(self) -> str:
         return (
-            f"{self.speed_mps[0]:.0f} to {self.speed_mps[1]:.0f} m/s, lateral acceleration "
-            f"{self.lateral_mps2[0]:+.1f} to {self.lateral_mps2[1]:+.1f} m/s2: "
+            f"{_range(self.speed_mps, 0)} m/s, lateral acceleration "
+            f"{_range(self.lateral_mps2, 1, '+')} m/s2: "
             f"{100 * self.share:.0f} % of the excess error ({self.error:.2f} of the floor)"
         )
 

@@ -10,7 +10,7 @@ from .catalogue import (
     effect,
 )
 from .plugins import Plugin, installed_effects
-from .scale import in_car, length_beyond
+from .scale import in_car, length_beyond, matters_in
 from .user import define_effect, forget_effect, load_effects, parameter, state
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "installed_effects",
     "length_beyond",
     "load_effects",
+    "matters_in",
     "parameter",
     "state",
 ]

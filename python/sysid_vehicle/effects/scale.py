@@ -50,6 +50,15 @@ def in_car(e: Effect, *, wheelbase_m: float, mass_kg: float) -> Effect:
     return replace(e, parameters=tuple(_sized(p, length, mass) for p in e.parameters))
 
 
+def matters_in(unit: str, wheelbase_m: float) -> float:
+    """How many times as large as in ordinary cars a length, a time or a speed is before it matters.
+
+    1 for units that know no length.
+    """
+    power = _MATTER.get(unit, _POWERS["m"] if unit == "m" else (0.0, 0.0))[0]
+    return math.pow(length_beyond(wheelbase_m), power)
+
+
 def length_beyond(wheelbase_m: float) -> float:
     """How many times as long as the nearer end of what is ordinary a car is; 1 within."""
     return _beyond(wheelbase_m, ORDINARY_WHEELBASE_M)

@@ -68,7 +68,7 @@ class SideslipObserver:
     vehicle : Vehicle
         The car; its tyres are where adaptation begins.
     settings : SideslipSettings, optional
-        The defaults if left out.
+        The defaults for the size of the car (`SideslipSettings.of_car`) if left out.
     kind : str
         One of :data:`KINDS`.
     judge : bool
@@ -111,7 +111,7 @@ class SideslipObserver:
         *,
         judge: bool = False,
     ) -> None:
-        values = dict(settings if settings is not None else SideslipSettings())
+        values = dict(settings if settings is not None else SideslipSettings.of_car(vehicle))
         car = observed_car(vehicle)
         core: _core._SideslipObserver
         if kind == "dual":

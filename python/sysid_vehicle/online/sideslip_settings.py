@@ -16,6 +16,8 @@ from ..vehicle import Vehicle
 
 # Quieter than these no sensor of a car is; simulated channels without noise are.
 _QUIETEST = {"vx_mps": 0.01, "yaw_rate_radps": 5e-4, "ax_mps2": 0.02, "ay_mps2": 0.02}
+_LENGTHS = ("relaxation_m", "ahead_m")
+_SPEEDS = ("stop_below_mps", "go_above_mps")
 NOISE_BLOCK = 100  # samples; vibration comes and goes with the driving
 
 
@@ -49,6 +51,18 @@ class SideslipSettings(Mapping[str, float]):
             )
 
     @classmethod
+    def of_car(cls, vehicle: Vehicle, **changes: float) -> SideslipSettings:
+        """The defaults with the lengths of a car, and with the speeds that go as their root.
+
+        A model car turns hard at speeds at which an ordinary one parks.
+        """
+        length = length_beyond(vehicle.wheelbase_m)
+        usual = _core.sideslip_defaults()
+        sizes = {name: length * usual[name] for name in _LENGTHS}
+        sizes |= {name: min(math.sqrt(length), 1.0) * usual[name] for name in _SPEEDS}
+        return cls(**{**sizes, **changes})
+
+    @classmethod
     def of(cls, log: Log, vehicle: Vehicle | None = None, **changes: float) -> SideslipSettings:
         """Take the noise of the sensors from the fast scatter of the log's channels.
 
@@ -60,12 +74,11 @@ class SideslipSettings(Mapping[str, float]):
             for name, least in _QUIETEST.items()
             if log.has(name)
         }
-        usual = _core.sideslip_defaults()
+        usual = _core.sideslip_defaults() if vehicle is None else cls.of_car(vehicle)
         slow = log.least_speed_mps / usual["stop_below_mps"]
-        length = 1.0 if vehicle is None else length_beyond(vehicle.wheelbase_m)
-        sizes = {name: slow * usual[name] for name in ("stop_below_mps", "go_above_mps")}
-        sizes |= {name: length * usual[name] for name in ("relaxation_m", "ahead_m")}
-        return cls(**{**noise, **sizes, **changes})
+        speeds = {name: slow * usual[name] for name in _SPEEDS}
+        lengths = {name: usual[name] for name in _LENGTHS}
+        return cls(**{**noise, **speeds, **lengths, **changes})
 
     def replace(self, **changes: float) -> SideslipSettings:
         """Return a copy with some settings changed."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def check(
     logs : Log or sequence of Log
         Driving with the same sensors.
     vehicle : Vehicle, optional
-        Says how far the IMU can be from the speed sensor.
+        Says how far the IMU can be from the speed sensor, and which faults harm a car of its size.
     seed : int
         Of the draws that teach the noise.
 
@@ -111,6 +112,9 @@ def checked(
         told = tuple(signal for log in together for signal in signals(log))
     floors = {r.channel: _floor(r, told) for r in readings}
     step_s = _step(readings)
+    told_of = partial(
+        faults_of, absent=lacking, wheelbase_m=None if vehicle is None else vehicle.wheelbase_m
+    )
 
     def of(
         some: Sequence[Readings],
@@ -129,13 +133,13 @@ def checked(
         for some in cut(stretches):
             with suppress(SysidError):  # a part may hold too little
                 parts.append(of(readings_of(together, some), some, lacks))
-        faults = faults_of(found, lacking, parts)
+        faults = told_of(found, parts=parts)
         for left in range(_SEARCHES, -1, -1):
             rivals = {}
             for without in doubted([fault.name for fault in faults if fault.found]):
                 other = of(readings, stretches, (*lacks, *without))
                 rivals[without] = Rival(other, preferred(means, found, other))
-            faults = faults_of(found, lacking, parts, rivals)
+            faults = told_of(found, parts=parts, rivals=rivals)
             best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
             if not left or best is None or best.worse >= 0.0:
                 break
@@ -143,11 +147,11 @@ def checked(
             if preferred(means, better, found) <= 0.0:
                 break
             found = better
-            faults = faults_of(found, lacking, parts)
+            faults = told_of(found, parts=parts)
         return found, faults
 
     found = of(readings, stretches, tuple(SWINGS))
-    faults = faults_of(found, lacking)
+    faults = told_of(found)
     if not enough(found, faults):
         found, faults = explained(found, tuple(SWINGS))
         if {*SWINGS} <= {*_names(have)}:
@@ -170,11 +174,14 @@ def _names(have: set[str]) -> list[str]:
     """Faults that these channels can show; without both speeds there is little."""
     hidden: set[str] = set()
     if "vy_mps" not in have:
-        # The lateral equation has an unknown of its own then; only its slow part is left.
-        hidden |= {"delay.speeds", "arm_x", "arm_y", "turn", "delay.ay_mps2", "lean.ay_mps2"}
-        hidden |= {"gain.yaw_rate_radps", *SWINGS}
+        # The lateral speed is then whatever a_y asks for: that of the place of the IMU, in its
+        # direction, of a body that swings. What moves a_x beside that is left, and would be taken
+        # for a scale of a_x if it were not estimated.
+        hidden |= {"delay.speeds", "arm_x", "turn", "gain.yaw_rate_radps", *SWINGS}
     if "ax_mps2" not in have:
         hidden |= {"arm_y", "delay.vx_mps", "turn"}
+        if "vy_mps" not in have:
+            hidden |= {"delay.ay_mps2", "lean.ay_mps2"}  # nothing holds the lateral speed
     return [n for n, kind in FAULTS.items() if kind.channel in have and n not in hidden]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from .._common.text import HALF_95
+from ..effects import matters_in
 from .kinematics.equations import lean
 from .kinematics.estimate import Estimate
 from .kinematics.parts import scatter
@@ -78,7 +79,8 @@ class SensorFault:
 class _Told:
     """A fault as it is told, the sum of estimated ones.
 
-    `enough` is a useful half interval; faults smaller than `negligible` harm nothing.
+    `enough` is a useful half interval; faults smaller than `negligible` harm nothing. Both
+    are those of an ordinary car.
     """
 
     name: str
@@ -88,6 +90,11 @@ class _Told:
     of: tuple[str, ...]
     enough: float
     negligible: float
+
+    def in_car(self, wheelbase_m: float) -> _Told:
+        """The same with the sizes of a car: a centimetre matters in a model car."""
+        by = matters_in(self.unit, wheelbase_m)
+        return replace(self, enough=by * self.enough, negligible=by * self.negligible)
 
 
 _SHOWN = {"s": (1000.0, "ms"), "rad": (1.0 / DEG, "deg"), "": (100.0, "%")}
@@ -203,6 +210,8 @@ def faults_of(
     absent: Sequence[str],
     parts: Sequence[Estimate] = (),
     rivals: Mapping[tuple[str, ...], Rival] | None = None,
+    *,
+    wheelbase_m: float | None = None,
 ) -> tuple[SensorFault, ...]:
     """Say what an estimate tells of each fault.
 
@@ -217,12 +226,15 @@ def faults_of(
     rivals : mapping of Rival, optional
         Explanations by what they leave out; one that is as likely as `found` makes all faults
         unsure in which the two differ.
+    wheelbase_m : float, optional
+        Of the car; by default an ordinary one.
     """
-    rows = [t for t in _TOLD if t.of[-1] in found.faults]
-    asked = _Asked(found, parts, rivals or {}, _critical(len(rows)))
+    every = _TOLD if wheelbase_m is None else tuple(told.in_car(wheelbase_m) for told in _TOLD)
+    rows = [t for t in every if t.of[-1] in found.faults]
+    asked = _Asked(found, parts, rivals or {}, _critical(len(rows)), every)
     return tuple(
         asked.fault(told) if told in rows else _untold(told, why_not(told.name, absent=absent))
-        for told in _TOLD
+        for told in every
     )
 
 
@@ -234,12 +246,13 @@ def _untold(told: _Told, why: str) -> SensorFault:
 
 @dataclass(frozen=True)
 class _Asked:
-    """What `faults_of` is told, and how many standard errors make a claim."""
+    """What `faults_of` is told, how many standard errors make a claim, and all that may be told."""
 
     found: Estimate
     parts: Sequence[Estimate]
     rivals: Mapping[tuple[str, ...], Rival]
     critical: float
+    every: Sequence[_Told]
 
     @cached_property
     def naive(self) -> np.ndarray:
@@ -277,7 +290,7 @@ class _Asked:
 
     def _one_of_two(self, told: _Told, rival: Rival, other: str) -> str:
         """Name of the fault that is there where this one is not, if that has to be so."""
-        twin = next((t for t in _TOLD if other in t.of), None)
+        twin = next((t for t in self.every if other in t.of), None)
         if twin is None or not replace(self, rivals={}).fault(told).found:
             return ""
         there = replace(self, found=rival.estimate, parts=(), rivals={}).fault(twin).found

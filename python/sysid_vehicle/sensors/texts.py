@@ -72,8 +72,9 @@ def why_not(
 def swings(faults: Mapping[str, float]) -> tuple[str, ...]:
     """What is said where the body's roll swings."""
     said = (
-        "ay_mps2: the roll of the body swings, which an IMU feels that is higher or lower than the "
-        "speed sensor; the faults are told beside that"
+        "ay_mps2: it reads as where the roll of the body swings and the IMU is higher or lower "
+        "than the speed sensor; speeds that were smoothed, as those of a differentiated position, "
+        "look like that, too; the faults are told beside it"
     )
     return (said,) if {*SWINGS} & {*faults} else ()
 

@@ -19,7 +19,7 @@ from sysid_vehicle import (
     identify,
     manoeuvres,
 )
-from sysid_vehicle.compare import FailureMap
+from sysid_vehicle.compare import FailureMap, Region
 from sysid_vehicle.estimate import MEASURED
 
 
@@ -154,3 +154,12 @@ def test_it_prints_and_draws(validation: Comparison, dragged: Comparison) -> Non
     assert set(MEASURED) <= drawn
     assert validation.plot() is not None
     assert validation.plot_residuals() is not None
+
+
+def test_cells_of_a_slow_car_have_two_ends() -> None:
+    assert str(Region((27.4, 29.6), (6.31, 8.1), 0.12, 5.79)).startswith(
+        "27 to 30 m/s, lateral acceleration +6.3 to +8.1 m/s2: 12 %"
+    )
+    assert str(Region((2.61, 2.93), (-0.02, 0.03), 0.07, 7.84)).startswith(
+        "2.6 to 2.9 m/s, lateral acceleration -0.02 to +0.03 m/s2: 7 %"
+    )

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle.effects import Effect, Parameter, in_car
+from sysid_vehicle.effects import Effect, Parameter, in_car, matters_in
 from sysid_vehicle.effects.scale import ORDINARY_MASS_KG, ORDINARY_WHEELBASE_M
 
 KNOWN = {*("m", "m2", "N", "N m", "N m2", "rad/N", "1/kW", "s/m", "s", "m/s", "rad/s")}
@@ -94,3 +94,11 @@ def test_a_saved_model_keeps_its_sizes(tmp_path: object) -> None:
     path = f"{tmp_path}/model.npz"
     model.save(path)
     assert sv.load(path).parts == model.parts
+
+
+def test_what_matters_follows_the_length_of_the_car() -> None:
+    assert matters_in("m", 0.5) == pytest.approx(0.25)
+    assert matters_in("s", 0.5) == pytest.approx(0.5)
+    assert matters_in("rad/s", 14.0) == pytest.approx(0.5)
+    assert {matters_in(unit, 2.6) for unit in KNOWN} == {1.0}
+    assert {matters_in(unit, 0.3) for unit in ("1", "rad", "")} == {1.0}

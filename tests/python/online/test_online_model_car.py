@@ -5,7 +5,7 @@ import pytest
 from model_cars import car, drives
 
 import sysid_vehicle as sv
-from sysid_vehicle.online import SideslipSettings, estimate_sideslip
+from sysid_vehicle.online import SideslipObserver, SideslipSettings, estimate_sideslip
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +36,17 @@ def test_it_is_found_with_its_error(slow: sv.Log) -> None:
     assert found is not None
     assert found.rms_deg < 0.3
     assert found.covered > 0.9
+
+
+def test_in_a_control_loop_it_is_found_without_settings(slow: sv.Log) -> None:
+    """The documented call: an observer that is given nothing but the car."""
+    observer = SideslipObserver(car())
+    names = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+    signals = np.column_stack([slow[name] for name in names])
+    steps = [observer.step(1.0 / slow.rate_hz, *row) for row in signals]
+    error = np.array([s.beta_rad for s in steps]) - np.arctan2(slow["vy_mps"], slow["vx_mps"])
+    assert np.mean([s.mode == 1 for s in steps]) < 0.05
+    assert np.degrees(np.sqrt(np.mean(error**2))) < 0.4
 
 
 def test_small_stiffnesses_are_printed_with_their_figures() -> None:

@@ -49,6 +49,14 @@ LOGGERS: dict[str, dict[str, tuple[str, float]]] = {
         "ay_mps2": ("acc_y", 1.0),
         "steer_rad": ("hand_wheel", 15.0),
     },
+    "model car": {
+        "time_s": ("t", 1.0),
+        "vx_mps": ("vx", 1.0),
+        "yaw_rate_radps": ("imu_gyro_z", 1.0),
+        "ax_mps2": ("imu_acc_x", 1.0),
+        "ay_mps2": ("imu_acc_y", 1.0),
+        "steer_rad": ("servo_cmd_rad", 1.0),
+    },
     "German": {
         "time_s": ("Zeit", 1.0),
         "vx_mps": ("Geschwindigkeit", 3.6),

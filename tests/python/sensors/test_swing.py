@@ -44,7 +44,8 @@ def test_an_imu_at_another_height_is_no_other_fault(
     assert abs(roll.value - ROLL) < 3.0 * roll.std
     for name in (*_DELAYS, "gain_yaw_rate", "imu_forward_m"):
         assert abs(check[name].value) < 3.0 * check[name].std
-    assert "the roll of the body swings" in str(check)
+    assert "where the roll of the body swings" in str(check)
+    assert "speeds that were smoothed" in str(check)
 
 
 def test_a_body_that_does_not_swing_is_not_said_to(lap: sv.Log) -> None:

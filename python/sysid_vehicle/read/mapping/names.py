@@ -71,6 +71,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"steer\w* ?(wheel )?ang\w*|lenk ?(rad ?)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
         r"\b(steer|steering|steered|delta( ?wheel)?)\b|\b(sas|lws|lwi) (ang\w*|winkel)$",
         r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",
+        r"\bservo (cmd |command )?(angle|rad|deg)\b|^servo (cmd|command)$",
     ),
     "fx_n": (
         r"^f ?x( n)?$",
