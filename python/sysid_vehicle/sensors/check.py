@@ -112,17 +112,17 @@ def checked(
     floors = {r.channel: _floor(r, told) for r in readings}
     step_s = _step(readings)
 
+    means = [averaged(r, _MEAN_S) for r in readings]
+
     def of(
         some: Sequence[Readings],
         where: Sequence[Stretch],
         without: Sequence[str],
         begin: dict[str, float] | None = None,
     ) -> Estimate:
-        means = [averaged(r, _MEAN_S) for r in some]
+        slow = means if some is readings else [averaged(r, _MEAN_S) for r in some]
         names = [name for name in _names(have) if name not in without]
-        return estimate(means, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
-
-    means = [averaged(r, _MEAN_S) for r in readings]
+        return estimate(slow, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
 
     def explained(found: Estimate, lacks: Sequence[str]) -> tuple[Estimate, Faults]:
         parts = []
