@@ -6,6 +6,7 @@ nothing is repeated here. Effects that users define stand beside them.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Any
@@ -345,6 +346,18 @@ def register(made: Effect) -> Effect:
     """
     _users[made.id] = made.seated({e.index for e in _users.values() if e.id != made.id})
     return _users[made.id]
+
+
+def of_users() -> tuple[Effect, ...]:
+    """The effects that users have defined in this process."""
+    return tuple(_users.values())
+
+
+def know(others: Iterable[Effect]) -> None:
+    """Take over effects that were defined in another process; those known here stay."""
+    for other in others:
+        if _users.get(other.id) != other:
+            register(other)
 
 
 def forget(name: str) -> None:

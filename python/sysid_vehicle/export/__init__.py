@@ -14,6 +14,7 @@ from ..vehicle import AXLES, Vehicle
 from .fmu import fmu_bytes
 from .languages import casadi_function, cpp_text, python_text
 from .tyres import tir_text
+from .vehicle_file import vehicle_and_rest
 
 __all__ = [
     "casadi_function",
@@ -25,6 +26,7 @@ __all__ = [
     "tir_text",
 ]
 
+_SHIFT = "cg_position.shift_rearward_m"
 _SUFFIXES = ".py, .hpp, .h, .fmu, .tir or .toml"
 
 
@@ -40,7 +42,9 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
         needs the standard library alone. ``.fmu``: a Functional Mock-up Unit of FMI 3.0 for model
         exchange and co-simulation, compiled for this platform, with its source. ``.tir``: property
         files of MF 5.2, one for each axle, ``_front`` and ``_rear`` added to the name. ``.toml``: a
-        vehicle file with the tyres and the yaw inertia of the model.
+        vehicle file with the tyres and the yaw inertia of the model, and with the numbers that its
+        effects changed, such as mass, centre of gravity or drag. Effects for which the file has no
+        place are named in a warning.
 
     Returns
     -------
@@ -67,9 +71,7 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
     elif suffix in (".hpp", ".h"):
         files = {path: cpp_text(model)}
     elif suffix == ".toml":
-        identified_vehicle(model).to_toml(path)
-        if model.effects:
-            warn(f"{path}: a vehicle file has no place for effects ({', '.join(model.effects)})")
+        _write_vehicle(model, path)
         return (path,)
     else:
         raise InvalidInput(
@@ -81,6 +83,22 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
 
 
 def identified_vehicle(model: Model) -> Vehicle:
-    """Return the vehicle with the tyres and the yaw inertia that the model has."""
-    tyres = {f"tyre_{axle}": model.tyre(axle) for axle in AXLES}
-    return model.vehicle.replace(**tyres, yaw_inertia_kgm2=model.value("yaw_inertia_kgm2"))
+    """Return the vehicle as the model has it: its tyres, and the numbers that effects changed."""
+    return vehicle_and_rest(model)[0]
+
+
+def _write_vehicle(model: Model, path: Path) -> None:
+    car, rest = vehicle_and_rest(model)
+    car.to_toml(path)
+    moved = model.value(_SHIFT) if _SHIFT in model.names and car.lf_m != model.vehicle.lf_m else 0.0
+    left = [e for e in rest.effects if e in model.effects]
+    if left:
+        warn(f"{path}: a vehicle file has no place for effects ({', '.join(left)})")
+    if moved:
+        warn(
+            f"{path}: the centre of gravity is {abs(moved):.3g} m further "
+            f"{'back' if moved > 0.0 else 'forward'} than before, and the sensors stay where they "
+            f"are; a model of this file reads them with .add('ins_lever_arm')"
+            f".with_values({{'ins_lever_arm.forward_m': "
+            f"{rest.value('ins_lever_arm.forward_m'):.6g}}})"
+        )

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from .._common.files import as_path, write_text
 from .._common.progress import with_progress
 from .._common.threads import cores
 from .._common.typed import typed
+from ..effects.catalogue import of_users
 from ..errors import SysidError, warn
 from ..read import ChannelMap
 from .jobs import Car, Drive, Job, check_asked, check_options, jobs_of
@@ -67,7 +69,8 @@ def improve_many(
     dbc : str or Path, optional
         As for `read_log`, for all files.
     define : sequence of path
-        Python files that define effects; this process and each other one run them.
+        Python files that define effects; this process and each other one run them. Effects that
+        the session has defined go to the other processes with the studies.
     retry : bool
         Whether to try again what failed in an earlier run.
     tell : callable, optional
@@ -122,7 +125,9 @@ def run(
     count = cores() if workers is None else whole(workers, "workers", 1)
     if executor is not None and not callable(getattr(executor, "submit", None)):
         expect(executor, Executor, "improve_many")
-    define(dict.fromkeys(path for job in jobs for path in job.define), again=True)
+    files = define(dict.fromkeys(path for job in jobs for path in job.define), again=True)
+    session = tuple(e for e in of_users() if e.id not in files)
+    jobs = [replace(job, effects=session) for job in jobs]
     check_asked(jobs)
     store = Store(out)
     say = tell if tell is not None else _silent

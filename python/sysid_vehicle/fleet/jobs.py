@@ -11,6 +11,7 @@ from typing import Any
 
 from .._common.files import as_path, refuse_unknown
 from .._common.typed import blaming
+from ..effects import Effect
 from ..errors import InvalidInput
 from ..log import Log
 from ..model import Model
@@ -45,6 +46,8 @@ class Job:
         Python files that define effects.
     options : mapping
         Further arguments of `improve`.
+    effects : tuple of Effect
+        Effects that were defined in the session, which another process does not know.
     """
 
     name: str
@@ -55,6 +58,7 @@ class Job:
     dbc: Path | None = None
     define: tuple[Path, ...] = ()
     options: Options = field(default_factory=dict)
+    effects: tuple[Effect, ...] = ()
 
     @property
     def car(self) -> str:
@@ -73,7 +77,8 @@ class Job:
         files = [None if self.dbc is None else _content(self.dbc), *map(_content, self.define)]
         logs = [[_content(x) for x in drives] for drives in (self.train, self.validation)]
         options = {name: self.options[name] for name in sorted(self.options)}
-        return fingerprint([self.model, channels, files, logs, options])
+        asked = [self.model, channels, files, logs, options]
+        return fingerprint([*asked, list(self.effects)] if self.effects else asked)
 
 
 def _content(source: Log | Path) -> Log | str:

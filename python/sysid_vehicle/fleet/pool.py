@@ -34,6 +34,7 @@ def process_pool(count: int) -> Iterator[ProcessPoolExecutor]:
         yield pool
     except BaseException:
         ours.close()
+        _terminate(pool)  # one that is still being loaded hears nothing else
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
@@ -41,6 +42,12 @@ def process_pool(count: int) -> Iterator[ProcessPoolExecutor]:
         theirs.close()
         for name in set_here:
             os.environ.pop(name, None)
+
+
+def _terminate(pool: ProcessPoolExecutor) -> None:
+    """End the processes of a pool; `terminate_workers` of Python 3.14 does no more."""
+    for process in list((getattr(pool, "_processes", None) or {}).values()):
+        process.terminate()
 
 
 def _begin(alive: Connection) -> None:

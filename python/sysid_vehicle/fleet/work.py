@@ -12,6 +12,7 @@ from pathlib import Path
 from .._common.memo import forget
 from .._common.threads import at_most
 from ..effects import load_effects
+from ..effects.catalogue import know
 from ..errors import SysidError
 from ..log import Log
 from ..read import read_log
@@ -50,6 +51,7 @@ def _done(job: Job) -> Outcome:
     began = time.perf_counter()
     try:
         define(job.define)
+        know(job.effects)
         # Other studies have the other cores.
         with at_most(1):
             train, validation = (_logs(job, drives) for drives in (job.train, job.validation))
@@ -69,13 +71,21 @@ def failed(job: Job, because: str, seconds: float = 0.0) -> Outcome:
     return Outcome(Row(job.name, job.car, failure=because or "unknown", seconds=seconds), None)
 
 
-def define(files: Iterable[Path], *, again: bool = False) -> None:
-    """Run files that define effects, those that this process has run only if asked."""
+def define(files: Iterable[Path], *, again: bool = False) -> frozenset[str]:
+    """Run files that define effects, those that this process has run only if asked.
+
+    Returns
+    -------
+    frozenset of str
+        Effects of the files that were run.
+    """
+    found: list[str] = []
     with _defining:
         for path in files:
             if again or path not in _defined:
-                load_effects(path)
+                found += [e.id for e in load_effects(path)]
                 _defined.add(path)
+    return frozenset(found)
 
 
 def _logs(job: Job, drives: tuple[Log | Path, ...]) -> list[Log]:

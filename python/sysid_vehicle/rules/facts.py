@@ -64,6 +64,8 @@ class Added:
         Others of the final model that act like it, where such a group was asked for its share.
     shared, shared_in_training : Share
         As `own`, of it and all of these together.
+    backed : bool
+        Whether readings alone, before any tyre, tell it with the same size.
     against : str
         What else speaks against its name, in words. Only asked of names that would stand beside
         something that is missing.
@@ -84,6 +86,7 @@ class Added:
     shared_in_training: Share = UNKNOWN
     felt: bool = True
     against: str = ""
+    backed: bool = False
 
     @property
     def named(self) -> bool:

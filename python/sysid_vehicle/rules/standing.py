@@ -48,9 +48,10 @@ def without_share(
     """
     names = frozenset(a.id for a in facts.added)
     late = frozenset(a.id for a in facts.added if a.late)
-    likely = _likely(facts, rules)
+    # What kinematics tells is no question of the errors ahead.
+    likely = _likely(facts, rules) | {a.id for a in facts.added if a.named and a.backed}
     shown = _standing(facts, rules)
-    spoken = {a.id: a.against for a in facts.added if a.named and a.against}
+    spoken = {a.id: a.against for a in facts.added if a.named and a.against and not a.backed}
     standing = shown.alone | shown.groups.keys() | shown.led.keys()
     falling = names - likely - standing - spoken.keys()
     found: list[tuple[frozenset[str], str]] = []

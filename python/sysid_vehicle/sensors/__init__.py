@@ -3,14 +3,17 @@
 from .check import check
 from .condition import Conditioning
 from .faults import SensorFault
-from .ready import made_ready
+from .ready import Kinematics, made_ready
 from .result import SensorCheck, put_right
+from .settled import backed
 from .signals import quantum
 
 __all__ = [
     "Conditioning",
+    "Kinematics",
     "SensorCheck",
     "SensorFault",
+    "backed",
     "check",
     "made_ready",
     "put_right",

@@ -116,17 +116,17 @@ def checked(
         faults_of, absent=lacking, wheelbase_m=None if vehicle is None else vehicle.wheelbase_m
     )
 
+    means = [averaged(r, _MEAN_S) for r in readings]
+
     def of(
         some: Sequence[Readings],
         where: Sequence[Stretch],
         without: Sequence[str],
         begin: dict[str, float] | None = None,
     ) -> Estimate:
-        means = [averaged(r, _MEAN_S) for r in some]
+        slow = means if some is readings else [averaged(r, _MEAN_S) for r in some]
         names = [name for name in _names(have) if name not in without]
-        return estimate(means, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
-
-    means = [averaged(r, _MEAN_S) for r in readings]
+        return estimate(slow, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
 
     def explained(found: Estimate, lacks: Sequence[str]) -> tuple[Estimate, Faults]:
         parts = []

@@ -50,6 +50,9 @@ class SensorFault:
     or_another : str
         Name of the fault that stands in its place in an explanation that is as likely, where one of
         the two is there; empty elsewhere.
+    measured : bool
+        Whether the log says more of its size than was known before. Where it does not, `value` and
+        `std` are those of what sensors usually do: no result of this log, and none is shown.
     """
 
     name: str
@@ -62,6 +65,7 @@ class SensorFault:
     found: bool
     why_not: str = ""
     or_another: str = ""
+    measured: bool = True
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -69,6 +73,8 @@ class SensorFault:
         return self.value - HALF_95 * self.std, self.value + HALF_95 * self.std
 
     def __str__(self) -> str:
+        if not self.measured:
+            return f"{self.title}: cannot be told, {self.why_not}"
         scale, unit = _SHOWN.get(self.unit, (1.0, self.unit))
         low, high = (scale * x for x in self.interval)
         tail = f" {unit}" if unit else ""
@@ -240,8 +246,9 @@ def faults_of(
 
 def _untold(told: _Told, why: str) -> SensorFault:
     return SensorFault(
-        told.name, told.channel, told.title, 0.0, math.inf, told.unit, False, False, why
-    )
+        told.name, told.channel, told.title, 0.0, math.inf, told.unit, False, False, why,
+        measured=False,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -285,7 +292,7 @@ class _Asked:
             reason = _confounded(told, pick, found, self.naive, list(found.faults))
         return SensorFault(
             told.name, told.channel, told.title, value, std, told.unit, claimed or well, claimed,
-            reason, another,
+            reason, another, measured=claimed or learned > _LEARNED,
         )  # fmt: skip
 
     def _one_of_two(self, told: _Told, rival: Rival, other: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from ..errors import SysidError
 from ..log import Log
@@ -16,7 +17,25 @@ _DELAYS = ("delay_vx_s", "delay_vy_s", "delay_ay_s")
 _LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level
 
 
-def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], list[Log], bool]:
+@dataclass(frozen=True)
+class Kinematics:
+    """What readings say of each other, before any tyre.
+
+    Attributes
+    ----------
+    settles : tuple of str
+        Effects that have been dealt with, or are not there.
+    left : tuple of SensorFault
+        Faults that are still in the readings.
+    """
+
+    settles: tuple[str, ...] = ()
+    left: tuple[SensorFault, ...] = ()
+
+
+def made_ready(
+    logs: Sequence[Log], others: Sequence[Log]
+) -> tuple[list[Log], list[Log], Kinematics]:
     """Logs with white noise, whose channels were read at the same moment.
 
     Biases, scales and places of sensors stay as they are: they are effects of the catalogue, which
@@ -31,24 +50,25 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     Returns
     -------
     logs, others : list of Log
-    delayed : bool
-        Whether a delay was found and taken out.
+    Kinematics
+        A delay that was found is taken out, and settled.
     """
     ready = conditioned([*logs, *others])
     own, rest = ready[: len(logs)], ready[len(logs) :]
     try:
         found = checked(own, enough=_nothing)
     except SysidError:
-        return own, rest, False
+        return own, rest, Kinematics()
     # A driver who steers, brakes and drives against a road that is not level makes speeds and
     # accelerations seem to come at other times.
     if max(found.estimate.road_mps2.values()) > _LEVEL_MPS2:
-        return own, rest, False
+        return own, rest, Kinematics()
+    left = tuple(fault for fault in found.faults if fault.name not in _DELAYS)
     late = to_put_right([found[name] for name in _DELAYS])
     if not late:
-        return own, rest, False
+        return own, rest, Kinematics((), left)
     done = [log.corrected(*corrected(log, late), retimed(log, late, found.faults)) for log in ready]
-    return done[: len(logs)], done[len(logs) :], True
+    return done[: len(logs)], done[len(logs) :], Kinematics(("sensor_delay",), left)
 
 
 def _nothing(_: Estimate, faults: Sequence[SensorFault]) -> bool:

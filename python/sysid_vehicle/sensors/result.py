@@ -225,7 +225,7 @@ class SensorCheck:
         rows: list[tuple[str, ...]] = []
         taken = to_put_right(self.faults)
         for fault in self.faults:
-            if np.isfinite(fault.std):
+            if fault.measured:
                 low, high = fault.interval
                 span = f"{number(low, 3)} to {number(high, 3)} {fault.unit}".rstrip()
                 value = number(fault.value, 3)
@@ -367,8 +367,8 @@ class SensorCheck:
             "faults": {
                 f.name: {
                     "channel": f.channel,
-                    "value": f.value if np.isfinite(f.std) else None,
-                    "std": f.std if np.isfinite(f.std) else None,
+                    "value": f.value if f.measured else None,
+                    "std": f.std if f.measured else None,
                     "unit": f.unit,
                     "found": f.found,
                     "told": f.told,

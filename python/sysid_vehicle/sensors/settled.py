@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from ..effects import Effect, Parameter
 from ..rules import USUAL, Rules
 from .faults import SensorFault, to_put_right
+
+
+class _Estimate(Protocol):
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def std(self) -> float: ...
+
 
 # Effects of the catalogue that are not to be looked for any more once their faults are told.
 _SETTLED = {
@@ -23,6 +34,8 @@ _SETTLED = {
 }
 # Parameters that are a fault by another name.
 _SAME = {
+    "imu_lever_arm.forward_m": "imu_forward_m",
+    "imu_lever_arm.left_m": "imu_left_m",
     "accelerometer_scale.ax_error": "gain_ax",
     "accelerometer_scale.ay_error": "gain_ay",
     "body_attitude.pitch_per_g_rad": "gain_ax",
@@ -30,6 +43,10 @@ _SAME = {
     "body_roll.roll_per_g_rad": "gain_ay",
     "gyro_scale.scale_error": "gain_yaw_rate",
 }
+
+
+# Of these kinematics knows no other effect that would be the same fault.
+_ITS_OWN = ("imu_lever_arm", "gyro_scale")
 
 
 def settled(faults: Sequence[SensorFault]) -> tuple[str, ...]:
@@ -66,6 +83,35 @@ def narrowed(
         )
         for e in effects
     )
+
+
+def backed(
+    estimates: Sequence[_Estimate], faults: Sequence[SensorFault], rules: Rules = USUAL
+) -> dict[str, str]:
+    """Effects that kinematics finds, too, with the same size: what it says, by effect.
+
+    Parameters
+    ----------
+    estimates : sequence
+        Of parameters of effects, by full name.
+    faults : sequence of SensorFault
+        That are still in the readings.
+    rules : Rules
+        How far apart two sets of data may be (`Rules.sure`).
+    """
+    by_name = {fault.name: fault for fault in faults}
+    found = {e.name: e for e in estimates}
+    told: dict[str, str] = {}
+    for effect in _ITS_OWN:
+        same = {n: by_name.get(f) for n, f in _SAME.items() if n.split(".")[0] == effect}
+        if not all(n in found and fault is not None for n, fault in same.items()):
+            continue
+        pairs = [(fault, found[n]) for n, fault in same.items() if fault is not None]
+        agree = all(abs(e.value - f.value) < rules.sure * np.hypot(e.std, f.std) for f, e in pairs)
+        there = [str(fault) for fault, _ in pairs if fault.found]
+        if agree and there:
+            told[effect] = ", ".join(there)
+    return told
 
 
 def _within(

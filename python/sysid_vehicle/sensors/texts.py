@@ -22,6 +22,19 @@ _NEEDS_EXCITATION = {
     "imu_left_m": "the yaw rate changes too slowly",
     "imu_turn_rad": "the car hardly corners",
 }
+_WOULD_TELL = {
+    "delay_vx_s": "firm braking and acceleration",
+    "delay_vy_s": "quick steering of several frequencies",
+    "delay_ay_s": "quick steering at several speeds",
+    "gain_yaw_rate": "the heading before and after whole turns, not in the log,",
+    "gain_ax": "firm braking and acceleration",
+    "gain_ay": "corners at several speeds",
+    "bias_yaw_rate_radps": "braking and acceleration through a wide range of speeds",
+    "bias_vy_mps": "corners at several speeds",
+    "imu_forward_m": "quick steering",
+    "imu_left_m": "quick steering",
+    "imu_turn_rad": "firm cornering, and braking on straights",
+}
 _OTHER = {
     "delay.speeds": "a delay of the speeds",
     "delay.vx_mps": "a delay of vx_mps",
@@ -59,14 +72,16 @@ def why_not(
 ) -> str:
     """Why a fault cannot be told: channels are missing, the driving is dull, or another acts so.
 
+    It says what driving would tell it, too.
     `there` says that one of these two is there.
     """
     if absent:
         return f"because {' and '.join(absent)} {'is' if len(absent) == 1 else 'are'} not logged"
+    would = f"; {_WOULD_TELL[name]} would tell it"
     if alone:
-        return f"because {_NEEDS_EXCITATION[name]}"
+        return f"because {_NEEDS_EXCITATION[name]}{would}"
     both = "; one of the two is there" if there else ""
-    return f"because {_OTHER[other]} acts alike in this driving{both}"
+    return f"because {_OTHER[other]} acts alike in this driving{both}{would}"
 
 
 def swings(faults: Mapping[str, float]) -> tuple[str, ...]:

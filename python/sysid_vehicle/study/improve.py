@@ -16,7 +16,7 @@ from ..identify.identify import maximised
 from ..log import Log, several_logs
 from ..model import Model
 from ..rules import USUAL, Rules
-from ..sensors import SensorCheck, made_ready, put_right
+from ..sensors import Kinematics, SensorCheck, made_ready, put_right
 from .asked import asked
 from .judge.judge import Judge
 from .limit import Judging, Schedule
@@ -130,10 +130,10 @@ def improve(
     rules = wants.rules
     schedule = Schedule.of(began, wants.limit_s)
     judging = Judging(schedule.judging)
-    train, test, settled, checked = _ready(train, test, sensors, schedule.sensors)
+    train, test, kinematics, checked = _ready(train, test, sensors, schedule.sensors)
     if not checked:
         judging.left_out.append(_CHANNELS)
-    left_out = {*wants.excluded, *settled}
+    left_out = {*wants.excluded, *kinematics.settles}
     wanted = tuple(e for e in wants.wanted if e.id not in left_out)
     others = {*left_out, *(e.id for e in wanted)}
     finer = tuple(e for e in refining() if e.id not in others) if candidates is None else ()
@@ -197,7 +197,7 @@ def improve(
         lacked=[e.id for e in (*wanted, *beside_what_they_refine(finer, found.fit.model))],
         sizes=wants.sizes,
         seed=seed,
-        settled=settled,
+        kinematics=kinematics,
     )
     with kept(found):
         return judge.study(began, checked=bool(sensors))
@@ -213,19 +213,19 @@ def _ready(
     test: Log | Sequence[Log] | None,
     sensors: SensorCheck | Literal[False] | None,
     ends: float,
-) -> tuple[Sequence[Log], Log | Sequence[Log] | None, tuple[str, ...], bool]:
-    """The logs with what their sensors do wrong taken out, and the effects that this settles.
+) -> tuple[Sequence[Log], Log | Sequence[Log] | None, Kinematics, bool]:
+    """The logs with what their sensors do wrong taken out, and what is known of the sensors.
 
     Last comes whether there was time for it until `ends`.
     """
     logs, others = several_logs(train), () if test is None else several_logs(test)
     if sensors is False:
-        return logs, test, (), True
+        return logs, test, Kinematics(), True
     if sensors is not None:
         put = [sensors.apply(log) for log in logs], put_right(sensors, test)
-        return *put, sensors.settles, True
+        return *put, Kinematics(sensors.settles), True
     ready = before(ends, lambda: made_ready(logs, others), None)
     if ready is None:
-        return logs, test, (), False
-    own, rest, delayed = ready
-    return own, None if test is None else rest, ("sensor_delay",) if delayed else (), True
+        return logs, test, Kinematics(), False
+    own, rest, kinematics = ready
+    return own, None if test is None else rest, kinematics, True

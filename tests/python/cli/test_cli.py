@@ -106,7 +106,7 @@ def test_improve_finds_the_effect_and_writes_json_and_report(
     found = result["effects"][0]
     assert set(found) == {
         *("id", "parameters", "error_before", "error_after", "p_value"),
-        *("confounded_with", "stands_in", "grade", "takes_little", "useful", "gains"),
+        *("confounded_with", "stands_in", "grade", "takes_little", "useful", "backed", "gains"),
         *("own_share", "own_share_in_training", "share_together", "share_together_in_training"),
     }
     lag = found["parameters"]["time_constant_s"]

@@ -225,3 +225,15 @@ def test_it_prints_and_draws(found: Diagnosis) -> None:
     assert any("confirmed" in t.get_text() for t in ax.texts)
     assert causes.plot() is not ax
     assert str(Causes({}, (), {})).startswith("no effect is shown to be missing")
+
+
+def test_what_is_in_no_set_is_as_probable_as_beside_those_that_stand(car: Vehicle) -> None:
+    """A mass that is wrong by a third bends the scores: a body that leans looked likely, too."""
+    heavy = Model(car).add("mass").with_values({"mass.relative_error": 0.3})
+    log = drive(heavy, manoeuvres.brake_in_turn(), seed=248527, rate_hz=50.0)
+    found = diagnose(identify(Model(car), log))
+    causes = found.causes
+    assert [s.effects for s in causes.sets] == [("mass",)]
+    others = {e: p for e, p in causes.inclusion.items() if e != "mass"}
+    assert max(found.proposed.rest.values()) > 0.3
+    assert max(others.values()) < 0.15

@@ -112,8 +112,8 @@ def test_a_late_yaw_rate_is_told_and_no_inertia_is_named(
     assert all(a.stands_in for a in found.added)
     assert "yaw_rate_radps: lags behind" in str(found)
     # Kinematics tell clocks against that of the yaw rate: what is left of it then is the input's.
-    ready, _, delayed = made_ready([log], [])
-    assert delayed
+    ready, _, found = made_ready([log], [])
+    assert found.settles
     (moved,) = (text for text in ready[0].corrections if text.startswith("ay_mps2: taken"))
     assert float(moved.split()[2]) == pytest.approx(100.0, abs=10.0)
     assert moved.endswith("ms earlier in the file")

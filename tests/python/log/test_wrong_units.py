@@ -27,6 +27,22 @@ WRONG: dict[str, tuple[Change, list[str]]] = {
     ),
     "vx in mm/s": (times(vx_mps=1e3), ["vx_mps: ", "if it is in mm/s, put factor = 0.001 in"]),
     "vx in cm/s": (times(vx_mps=1e2), ["vx_mps: ", "if it is in cm/s, put factor = 0.01 in"]),
+    "ay in ft/s2": (
+        times(ay_mps2=1 / 0.3048),
+        ["ay_mps2: seems to be in ft/s2: ", "factor = 0.3048 for ay_mps2"],
+    ),
+    "ax in ft/s2": (
+        times(ax_mps2=1 / 0.3048),
+        ["ax_mps2: seems to be in ft/s2: ", "factor = 0.3048 for ax_mps2"],
+    ),
+    "yaw rate in rpm": (
+        times(yaw_rate_radps=30.0 / np.pi),
+        ["yaw_rate_radps: seems to be in rpm", "factor = 0.1047198 for yaw_rate_radps"],
+    ),
+    "yaw rate in turns": (
+        times(yaw_rate_radps=0.5 / np.pi),
+        ["yaw_rate_radps: seems to be in turns per second: ", "factor = 6.283185 for yaw"],
+    ),
     "ay in mg": (
         times(ay_mps2=1e3 / G),
         ["if it is in mg, put factor = 0.00980665; if it is in cm/s2, put factor = 0.01 in"],

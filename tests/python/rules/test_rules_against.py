@@ -29,3 +29,12 @@ def test_what_speaks_against_a_name_takes_it_back_and_no_other() -> None:
     assert standing(small, verdict(small)) == {"mass"}
     # Beside nothing that is missing nobody asks.
     assert verdict(replace(WHOLE, added=told.added)).verdict == "explained"
+
+
+def test_what_kinematics_tells_is_no_question_of_errors_ahead() -> None:
+    """A sensor elsewhere in the car takes no share of the errors, and is there all the same."""
+    arm = Added("imu_lever_arm", "missing", (), frozenset({"ay_mps2"}), Share(0.0, -0.1, 0.1))
+    told = replace(LEFT, added=(MASS, arm))
+    assert standing(told, verdict(told)) == {"mass"}
+    backed = replace(LEFT, added=(MASS, replace(arm, backed=True, against="other values")))
+    assert standing(backed, verdict(backed)) == {"mass", "imu_lever_arm"}

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import sysid_vehicle as sv
 from sysid_vehicle.sensors.kinematics.motion import Stretch
 from sysid_vehicle.sensors.kinematics.parts import Scatter, cut, scatter
+from sysid_vehicle.sensors.kinematics.system import Band
 
 
 def test_parts_are_of_one_length_and_hold_all_the_driving() -> None:
@@ -47,3 +49,16 @@ def test_a_scale_that_changes_is_no_fault_of_the_sensor() -> None:
 
     assert found(0.08)["gain_ay"].found
     assert not found(np.where(late, 0.16, 0.0))["gain_ay"].found
+
+
+def test_variances_are_those_of_the_inverse(rng: np.random.Generator) -> None:
+    n, width = 130, 6
+    lower = sparse.diags(
+        [rng.standard_normal(n - k) * 0.3**k + 2.0 * (k == 0) for k in range(width)],
+        [-k for k in range(width)],
+    )
+    h = sparse.csr_matrix(lower @ lower.T)
+    rows = sparse.random(70, n, density=0.03, random_state=4, format="csr")
+    rows = sparse.csr_matrix(rows[rows.getnnz(axis=1) > 0])
+    expected = np.diag(rows @ np.linalg.inv(h.toarray()) @ rows.T.toarray())
+    np.testing.assert_allclose(Band(h).variances(rows), expected, rtol=1e-9)

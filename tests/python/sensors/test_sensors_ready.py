@@ -51,10 +51,10 @@ def low_passes_of(logs: list[sv.Log]) -> dict[str, tuple[Response, float]]:
 
 def test_white_noise_is_left_as_it_is(log: sv.Log) -> None:
     assert conditioned([log])[0] is log
-    own, others, delayed = made_ready([log], [log])
+    own, others, found = made_ready([log], [log])
     assert own[0] is log
     assert others[0] is log
-    assert not delayed
+    assert not found.settles
 
 
 def test_a_low_pass_is_told_from_the_noise_it_leaves(log: sv.Log) -> None:
@@ -250,15 +250,15 @@ def test_where_no_fault_is_found_no_part_is_asked(
     monkeypatch.setitem(_ready.checked.__wrapped__.__globals__, "cut", refused)
     with pytest.raises(RuntimeError, match="a part"):
         sv.check(part)
-    own, _, delayed = made_ready([part], [])
-    assert not delayed
+    own, _, found = made_ready([part], [])
+    assert not found.settles
     assert own[0] is part
 
 
 def test_late_speeds_are_read_earlier_in_all_logs(log: sv.Log) -> None:
     late = {c: np.interp(log["time_s"] - 0.02, log["time_s"], log[c]) for c in MOTION[:2]}
-    own, others, delayed = made_ready([_with(log, **late)], [_with(log, **late)])
-    assert delayed
+    own, others, found = made_ready([_with(log, **late)], [_with(log, **late)])
+    assert found.settles
     for ready in (*own, *others):
         inner = slice(10, -10)
         for channel in MOTION[:2]:
@@ -276,11 +276,11 @@ def test_on_a_road_that_wanders_kinematics_tells_no_delays(
     late = _with(log, vx_mps=np.interp(log["time_s"] - 0.03, log["time_s"], log["vx_mps"]))
     checked = sv.check(late)
     assert checked["delay_vx_s"].found
-    assert made_ready([late], [])[2]
+    assert made_ready([late], [])[2].settles
     wandering = replace(checked.estimate, road_mps2={"grade": 0.15, "bank": 0.0})
     monkeypatch.setattr(_ready, "checked", lambda *_, **__: replace(checked, estimate=wandering))
-    own, _, delayed = made_ready([late], [])
-    assert not delayed
+    own, _, found = made_ready([late], [])
+    assert not found.settles
     assert own[0] is late
 
 
@@ -340,10 +340,10 @@ def test_a_body_that_rolls_makes_no_sensor_late(truth: sv.Model) -> None:
     slow_ms = 1000.0 * 0.09 / 1.09 * 2.0 * 0.3 / (2.0 * np.pi * 1.5)  # and more towards 1.5 Hz
     assert 0.5 * slow_ms < float(late.split()[2]) < 2.5 * slow_ms
     assert not sv.check(check.apply(log)).found
-    assert not made_ready([log], [])[2]
+    assert not made_ready([log], [])[2].settles
     # A sensor that is later than that is told on the same car.
     ay = np.interp(log["time_s"] - 0.03, log["time_s"], log["ay_mps2"])
-    own, _, delayed = made_ready([_with(log, ay_mps2=ay)], [])
-    assert delayed
+    own, _, found = made_ready([_with(log, ay_mps2=ay)], [])
+    assert found.settles
     (moved,) = (text for text in own[0].corrections if text.startswith("ay_mps2: taken"))
     assert float(moved.split()[2]) == pytest.approx(30.0, abs=4.0)

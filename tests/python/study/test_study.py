@@ -136,8 +136,8 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     assert study.added[0].id in told["causes"]["sets"][0]["effects"]
     (added,) = told["effects"]
     assert sorted(added) == [
-        *("confounded_with", "error_after", "error_before", "gains", "grade", "id", "own_share"),
-        *("own_share_in_training", "p_value", "parameters", "share_together"),
+        *("backed", "confounded_with", "error_after", "error_before", "gains", "grade", "id"),
+        *("own_share", "own_share_in_training", "p_value", "parameters", "share_together"),
         *("share_together_in_training", "stands_in", "takes_little", "useful"),
     ]
     assert added["confounded_with"] == list(study.added[0].confounded_with)

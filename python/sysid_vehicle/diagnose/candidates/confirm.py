@@ -5,6 +5,8 @@ bent: what that effect does beyond first order looks like further effects. The s
 that is refitted best stands; another one stands if its likeliest effect, refitted beside those
 before it, gains its price, and an unknown force or a clock if anything is left beside all of them.
 Scores beside those before it are asked first: what gains next to nothing there is not refitted.
+What is in no set is as probable as it is beside those that stand: a mass that is wrong by a third
+made a leaning body likely that is not there.
 """
 
 from __future__ import annotations
@@ -15,8 +17,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..unexplained.omnibus import Unknown
 from .candidate import Candidate
 from .causes import Causes, CredibleSet
+from .clocks import shifts
+from .possible import lacking
+from .posterior import causes_of
 from .refits import refitted
 from .reservation import Beside, beside
 from .score import score_board_of
@@ -49,7 +55,17 @@ def confirmed_causes(dx: Diagnosis) -> Causes:
     kept = [_leading(best, dx, first), *kept]
     if left.omnibus.rejects:
         kept += [s for s, effect in told.items() if not effect]
-    return proposed.only(kept, dx.sizes)
+    return replace(proposed, rest=_rest(proposed, left)).only(kept, dx.sizes)
+
+
+def _rest(proposed: Causes, left: Beside) -> dict[str, float]:
+    """Probabilities of what is in no set, no larger than beside the sets that stand."""
+    if not any(p > 1.0 - left.rules.credible for p in proposed.rest.values()):
+        return proposed.rest
+    others, evidence = lacking(left.fit.model, left.lacked), left.evidence
+    board = score_board_of(evidence, others, left.rules, Unknown(evidence), *shifts(evidence))
+    beside_all = causes_of(board, evidence, left.rules).inclusion
+    return {e: min(p, beside_all.get(e, 0.0)) for e, p in proposed.rest.items()}
 
 
 def _one_by_one(

@@ -40,8 +40,10 @@ _FRONT_SHARE, _FRONT_SPREAD = 0.5, 0.2  # of the lateral force: what the front a
 _DRAG_PER_M = 0.003  # half the air's density times a large drag area, over the mass of a light car
 
 _AX_G = ("ax_mps2", "g", "factor = 9.80665")
+_AX_FEET = ("ax_mps2", "ft/s2", "factor = 0.3048")
 _LONGITUDINAL_SLIPS: Slips = (
     (GRAVITY_MPS2, (_AX_G,)),
+    (0.3048, (_AX_FEET,)),
     (3.6, (VX_KMH,), tuple((1.0 / factor, one) for factor, one in LIKE_KMH)),
     (1.0 / 0.44704, (VX_MPH,), tuple((1.0 / factor, one) for factor, one in LIKE_MPH)),
     (3.6 * GRAVITY_MPS2, (_AX_G, VX_KMH), tuple((1.0 / factor, one) for factor, one in LIKE_G_KMH)),

@@ -61,14 +61,21 @@ _HOLDS = 0.2  # of what it demands: a law that holds this closely needs no regre
 _SLIDE_STD = 0.35
 
 _YAW_DEG = ("yaw_rate_radps", "degrees per second", f"factor = {DEG}")
+_YAW_RPM = ("yaw_rate_radps", "rpm", "factor = 0.1047198")
+_YAW_TURNS = ("yaw_rate_radps", "turns per second", "factor = 6.283185")
 _AY_G = ("ay_mps2", "g", "factor = 9.80665")
+_AY_FEET = ("ay_mps2", "ft/s2", "factor = 0.3048")
 _VY_KMH = ("vy_mps", "km/h", "factor = 0.2777778")
 _VY_MPH = ("vy_mps", "miles per hour", "factor = 0.44704")
+_VY_KNOTS = ("vy_mps", "knots", "factor = 0.5144444")
+_VY_FEET = ("vy_mps", "feet per second", "factor = 0.3048")
 _RAD, _G = math.pi / 180.0, GRAVITY_MPS2
 
 _LATERAL_SLIPS: Slips = (
     (_RAD, (_YAW_DEG,)),
-    (1.0 / _G, (_AY_G,)),
+    (1.0 / _G, (_AY_G,), ((math.pi / 30.0, (_YAW_RPM,)),)),
+    (1.0 / 0.3048, (_AY_FEET,)),
+    (2.0 * math.pi, (_YAW_TURNS,)),
     (1.0 / 3.6, (VX_KMH,), LIKE_KMH),
     (0.44704, (VX_MPH,), LIKE_MPH),
     (_RAD / _G, (_YAW_DEG, _AY_G)),
@@ -76,7 +83,10 @@ _LATERAL_SLIPS: Slips = (
     (1.0 / _G / 3.6, (_AY_G, VX_KMH), LIKE_G_KMH),
     (_RAD / _G / 3.6, (_YAW_DEG, _AY_G, VX_KMH)),
 )
-_SLIDING_SLIPS: Slips = ((3.6, (_VY_KMH,)), (1.0 / 0.44704, (_VY_MPH,)))
+_SLIDING_SLIPS: Slips = (
+    (3.6, (_VY_KMH,), ((1.0 / 0.3048, (_VY_FEET,)),)),
+    (1.0 / 0.44704, (_VY_MPH,), ((1.0 / 0.5144444, (_VY_KNOTS,)),)),
+)
 
 
 def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[Contradiction]:

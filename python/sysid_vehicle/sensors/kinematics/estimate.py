@@ -329,8 +329,7 @@ def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -
 
 def _road(rows: scipy.sparse.csr_matrix, x: FloatArray, band: Band, now: float) -> float:
     """New standard deviation of the change within a second (EM, exact)."""
-    inverse = band.solve(np.asarray(rows.T.todense()))
-    spread = np.asarray((rows @ inverse).diagonal()) if rows.shape[0] else np.zeros(1)
+    spread = band.variances(rows) if rows.shape[0] else np.zeros(1)
     change = rows @ x
     # The step of EM is too short where the road hardly moves: MacKay's is taken where it is safe.
     seen = rows.shape[0] - float(spread.sum()) / now**2

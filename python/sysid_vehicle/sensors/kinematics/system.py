@@ -14,6 +14,7 @@ from .colour import Colour
 from .equations import Readings, predict
 from .motion import Grid, IntArray
 
+_AT_ONCE = 32  # right-hand sides that are solved for together
 _OUTLIER = 4.0  # whitened errors beyond count less (Huber)
 
 
@@ -37,6 +38,25 @@ class Band:
         """Solve with the factorised information."""
         x: FloatArray = scipy.linalg.cho_solve_banded((self.factor, True), b, check_finite=False)
         return x
+
+    def variances(self, rows: scipy.sparse.csr_matrix) -> FloatArray:
+        """Variances of sums of coefficients, one for each row.
+
+        The square of what the factor makes of a row, from its first coefficient on: before it
+        there is nothing.
+        """
+        rows = rows.sorted_indices()
+        first = rows.indices[rows.indptr[:-1]]
+        order = np.argsort(first, kind="stable")
+        found = np.empty(rows.shape[0])
+        for some in (order[k : k + _AT_ONCE] for k in range(0, order.size, _AT_ONCE)):
+            begin = int(first[some[0]])
+            right = np.asfortranarray(rows[some, begin:].toarray().T)
+            half, info = scipy.linalg.lapack.dtbtrs(self.factor[:, begin:], right, uplo="L")
+            if info:
+                raise NumericalError("the posterior of the motion is singular")
+            found[some] = np.sum(half**2, axis=0)
+        return as_float64(found)
 
     def draw(self, z: FloatArray) -> FloatArray:
         """Solve with the transposed factor: normal numbers become draws of the posterior."""

@@ -18,6 +18,7 @@ from ...estimate import Driving
 from ...identify import Estimate, Fit, driving_of
 from ...log import unexcited
 from ...rules import LACKING, USUAL, Facts, Rules, incomplete, standing, verdict
+from ...sensors import Kinematics, backed
 from ..ahead.beyond import Beyond
 from ..ahead.own_share import (
     alike,
@@ -75,8 +76,8 @@ class Judge:
         Effects that were considered.
     sizes : mapping or None
         Errors that matter, where a user said which.
-    settled : collection of str
-        Effects that a check of the sensors has answered.
+    kinematics : Kinematics
+        Of the sensors: what it settles is in no doubt.
     """
 
     trail: Trail
@@ -86,7 +87,7 @@ class Judge:
     lacked: Collection[str]
     sizes: Mapping[str, float] | None
     seed: int
-    settled: Collection[str] = ()
+    kinematics: Kinematics
 
     @property
     def fit(self) -> Fit:
@@ -134,6 +135,7 @@ class Judge:
             (_STEPS, lambda: way(self.trail.fits)) if endless else None,
         )
         alone = self._alone(rivals)
+        known = backed(fit.estimates, self.kinematics.left, rules)
         facts = facts_of(
             outer,
             alone,
@@ -149,6 +151,7 @@ class Judge:
             unforeseen=expected is not None and expected.unforeseen,
             slow=slow,
             unfelt=insignificant(fit, rules),
+            backed=known,
         )
         if self.added and incomplete(facts, rules):
             facts = self._with_shares(facts, explained)
@@ -183,6 +186,7 @@ class Judge:
                 rules,
                 estimates_of(fit, wide),
                 idle,
+                known,
             ),
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
@@ -205,7 +209,7 @@ class Judge:
         )
 
     def _one_for_all(self) -> str:
-        asked = {*self.lacked, *self.settled}
+        asked = {*self.lacked, *self.kinematics.settles}
         return one_for_all(self.trail.fits[0], self.fit, self.added, asked, self.rules)
 
     def _explained(self) -> Beyond:

@@ -27,6 +27,7 @@ def facts_of(
     unforeseen: bool = False,
     slow: tuple[str, ...] = (),
     unfelt: Collection[str] = (),
+    backed: Collection[str] = (),
 ) -> Facts:
     """Collect what is known of a final model.
 
@@ -45,6 +46,8 @@ def facts_of(
         As in `Facts`.
     unfelt : collection of str
         Effects of which no parameter is shown to be off nothing.
+    backed : collection of str
+        Effects that kinematics alone finds, with the same size.
     """
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
     missing: tuple[float, ...] = (1.0,) if added else (0.0,)
@@ -57,7 +60,14 @@ def facts_of(
         (missing[0], missing[-1]),
         1.0 if explained is None else explained.low,
         tuple(
-            Added(v.effect.id, v.finding, v.group, v.effect.moved, felt=v.effect.id not in unfelt)
+            Added(
+                v.effect.id,
+                v.finding,
+                v.group,
+                v.effect.moved,
+                felt=v.effect.id not in unfelt,
+                backed=v.effect.id in backed,
+            )
             for v in told.all
             if v.effect.id in added
         ),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from ...diagnose import Verdicts
 from ...identify import Estimate, Fit
 from ...rules import UNKNOWN, USUAL, Decision, Facts, Grade, Rules, Share, grade, little
 from ..search.search import Trail
+
+_NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ class AddedEffect:
         Whether some error on validation data, one step or 1 to 5 s ahead, is shown to fall with it
         in its turn, that of one step falls by a part worth a name (`Rules.taken`), or it has an own
         share there. True where nobody asked in time.
+    backed : str
+        What kinematics alone tells of it, where that is the same; empty elsewhere.
     own, own_in_training : Share
         Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
         what it takes away: on validation and on training data. Unknown where nothing is missing,
@@ -61,6 +66,7 @@ class AddedEffect:
     grade: Grade = "plausible"
     takes_little: bool = False
     useful: bool = True
+    backed: str = ""
     own: Share = UNKNOWN
     own_in_training: Share = UNKNOWN
     together: Share = UNKNOWN
@@ -82,7 +88,7 @@ class AddedEffect:
             sure = self.grade == "alias"
             what = "compensates for something else" if sure else "may compensate for something else"
             said.append(f"it {what}: {self.stands_in}")
-        elif self.takes_little and self.useful:
+        elif self.takes_little and self.useful and not self.backed:
             said.append("the error hardly falls with it: another effect may explain as much")
         if not self.useful:
             said.append(
@@ -95,7 +101,8 @@ class AddedEffect:
         size = ", ".join(
             f"{e.name.split('.')[1]} {e.size}{unit_after(e.unit)}" for e in self.parameters
         )
-        told = (f"{self.id}: {size}", self.grade, self.shared_out, self.reserve)
+        known = f"kinematics alone tells it: {self.backed}" if self.backed else ""
+        told = (f"{self.id}: {size}", self.grade, known, self.shared_out, self.reserve)
         return "; ".join(text for text in told if text)
 
     @property
@@ -121,6 +128,7 @@ class AddedEffect:
             "grade": self.grade,
             "takes_little": self.takes_little,
             "useful": self.useful,
+            "backed": self.backed,
             "own_share": self.own.to_dict(),
             "own_share_in_training": self.own_in_training.to_dict(),
             "share_together": self.together.to_dict(),
@@ -145,6 +153,7 @@ def added_by(
     rules: Rules = USUAL,
     estimates: Sequence[Estimate] | None = None,
     idle: Collection[str] = (),
+    backed: Mapping[str, str] = _NOTHING,
 ) -> tuple[AddedEffect, ...]:
     """The effects of a study in the order in which they were added.
 
@@ -168,6 +177,8 @@ def added_by(
         Of the parameters of the final model; by default those of its fit.
     idle : collection of str
         Effects with which no error on validation data is shown to fall in their step.
+    backed : mapping of str
+        What kinematics says of effects that it tells, too.
     """
     added = []
     known = {
@@ -198,13 +209,14 @@ def added_by(
                     grade(
                         alone[name].finding,
                         finding,
-                        much_left=decision.much_left,
-                        takes_little=small or name in shared,
+                        much_left=decision.much_left and name not in backed,
+                        takes_little=(small or name in shared) and name not in backed,
                     ),
                     small,
                     name not in idle
                     or before.error - after.error > rules.taken * before.error
                     or any(share.known and share.low > 0.0 for share in own[::2]),
+                    backed.get(name, ""),
                     *own,
                 )
             )
