@@ -77,16 +77,17 @@ def test_a_rival_by_its_score_is_refitted_or_none(twice: Fit) -> None:
         best = finished(twice, refitted(twice, twice.driving, lag))
         left = omnibus(twice, twice.driving)
         board = score_board(twice, twice.driving, twice.model.candidates)
-        found = these.beside_the_leading(scored, [best], (), 2, left, board)
+        found, unfollowed = these.beside_the_leading(scored, [best], (), 2, left, board)
+        assert not unfollowed
         assert all(c.finished and c.fit is not None for c in found)
         few, hidden = found[:2], found[2:]
         assert [c.id for c in few] == [c.id for c in scored if c.id in others][:2]
         assert all(is_hidden_by_noise(c.effect) for c in hidden)
         assert not {c.id for c in hidden} & {c.id for c in few}  # none twice
-        again = these.beside_the_leading(scored, [best], few, 2, left, board)
+        again, _ = these.beside_the_leading(scored, [best], few, 2, left, board)
         assert not {c.id for c in again} & {c.id for c in few}
         late = replace(these, ends=0.0)
-        assert late.beside_the_leading(scored, [best], (), 2, left, board) == []
+        assert late.beside_the_leading(scored, [best], (), 2, left, board) == ([], ())
         # Neither what is refitted and gains less, nor what is far behind, is a rival any more.
         told = with_refit_rivals([best, few[0]], few[1:], twice.driving, USUAL, pool, np.inf)
     assert not {c.id for c in few} & {*told[0].indistinguishable_from}

@@ -47,7 +47,7 @@ def test_what_has_no_noise_of_its_own_in_time_is_held_against_the_like(
     """Of two candidates one is finished before the limit, the other is not."""
     done: list[str] = []
 
-    def one_only(fit: Fit, c: Candidate) -> Candidate:
+    def one_only(fit: Fit, c: Candidate, least: float) -> Candidate:
         done.append(c.id)
         return replace(c, statistic=1e9) if len(done) == 1 else c
 

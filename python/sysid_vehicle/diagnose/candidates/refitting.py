@@ -95,7 +95,7 @@ class Refitting:
         most: int,
         left: Omnibus,
         board: ScoreBoard,
-        follow_all: bool,
+        follow_all: bool = True,
     ) -> tuple[list[Candidate], tuple[str, ...]]:
         """Refits of rivals of the best one, and of what no score shows, all side by side.
 
