@@ -27,8 +27,8 @@ _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
-_FAR_BELOW_BY_FEW = 50.0  # nats, chosen as `FAR_BELOW`
-# Nats, most by which a lag, and any effect, was seen to climb from where it settled (`FAR_BELOW`).
+_FAR_BELOW_BY_FEW = 50.0  # nats on few samples, chosen as `FAR_BELOW`
+# Nats, most that a lag, and any one effect, climbed from where it had settled (`FAR_BELOW`).
 _CLIMBS, _ANY_CLIMBS = 4.0, 100.0
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
 # Nats, and standard errors, between maxima that are one: climbs end so far from each other.
@@ -350,7 +350,7 @@ def on_its_road(fit: Fit) -> Fit:
 
 
 def log_likelihood_of(objective: Objective, p: FloatArray, noise: FloatArray) -> float:
-    """Of the data; minus infinity where the model fails."""
+    """Minus infinity where the model fails."""
     try:
         return float(objective.freeze(p, noise).log_likelihood)
     except NumericalError:

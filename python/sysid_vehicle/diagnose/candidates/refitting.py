@@ -220,10 +220,16 @@ class Refitting:
             top[c.effect.along_alone] = max(top.get(c.effect.along_alone, 0.0), c.statistic)
         near = [c for c in tried if c.statistic > _NEAR * top[c.effect.along_alone]]
         near.sort(key=lambda c: -c.statistic)
-        # The first one tells how far the others have to come.
-        done = list(map(self._at_its_maximum(), near[:1]))
-        least = max((c.fit.log_likelihood for c in done if c.fit), default=-np.inf)
-        done += self.pool.map(self._at_its_maximum(least), near[1:])
+        # The first ones of both motions tell how far the others have to come.
+        leaders = [*{c.effect.along_alone: c for c in reversed(near)}.values()]
+        near = [*leaders, *(c for c in near if c not in leaders)]
+        done = list(self.pool.map(self._at_its_maximum(), leaders))
+        least = {c.effect.along_alone: _height(c) for c in done}
+
+        def follow(c: Candidate) -> Candidate:
+            return self._at_its_maximum(least[c.effect.along_alone])(c)
+
+        done += self.pool.map(follow, near[len(leaders) :])
         if any(c is begun and c.fit for c, begun in zip(done, near, strict=True)):
             done = near  # with noise of their own only some would seem the likelier ones
         ids = {c.id for c in done}
@@ -239,6 +245,10 @@ class Refitting:
             if c.fit is not None:
                 left = omnibus(c.fit, self.driving, self.rules)
         return left.p_value < self.rules.strict
+
+
+def _height(c: Candidate) -> float:
+    return -np.inf if c.fit is None else c.fit.log_likelihood
 
 
 def _hidden_by_tyres(ranked: Sequence[Candidate], finished: Sequence[Candidate]) -> list[Candidate]:

@@ -126,7 +126,7 @@ def settle(
     converged : bool
         Whether it came to a stand.
     """
-    p = box.inside(p)
+    p, followed = box.inside(p), False
     if parameters_first:
         p, _ = descend(objective, p, noise, box, method=method)
     steps = 6
@@ -136,10 +136,10 @@ def settle(
     if led is not None:
         near, told = led
         if objective.log_likelihood(near, told) > objective.log_likelihood(p, noise):
-            p, noise, steps = near, told, 3
+            p, noise, steps, followed = near, told, 3, True
     best = -np.inf
     gains = objective.freeze(p, noise)
-    if steps < 6 and least > -np.inf and _hopeless(objective, least, p, gains, noise)[0]:
+    if followed and least > -np.inf and _hopeless(objective, least, p, gains, noise)[0]:
         return p, noise, False
     for _ in range(rounds):
         learned = objective.learn_noise(p, noise, rounds=steps, enough=_LITTLE)
