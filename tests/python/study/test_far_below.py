@@ -1,7 +1,6 @@
 """What ends far below the best effect is not followed, and asked for where that does not hold."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from sysid_vehicle.diagnose import with_unfollowed
 from sysid_vehicle.diagnose.candidates import refitting
 from sysid_vehicle.diagnose.candidates.candidate import Candidate
 from sysid_vehicle.diagnose.candidates.refits import finished, refitted
-from sysid_vehicle.identify import far_below, maximum, refine_above
+from sysid_vehicle.identify import far_below, refine_above
 from sysid_vehicle.study.search import steps
 
 BEST, POORER, HIDDEN = "speed_sensor_misalignment", "side_wind", "tyre_relaxation"
@@ -92,25 +91,17 @@ def test_the_best_alone_is_followed_in_any_case(
 
 
 def test_a_lag_below_a_rival_ends_on_few_samples(
-    lacking: Fit, best: Fit, monkeypatch: pytest.MonkeyPatch
+    lacking: Fit, best: Fit, settled_on: list[int]
 ) -> None:
     model = lacking.model.add(HIDDEN).with_values({f"{HIDDEN}.relaxation_length_m": 0.5})
-    asked: list[int] = []
-    settle = maximum.settle
-
-    def counted(objective: Any, *args: Any, **kwargs: Any) -> Any:
-        asked.append(objective.samples)
-        return settle(objective, *args, **kwargs)
-
-    monkeypatch.setattr(maximum, "settle", counted)
     found = refine_above(model, lacking.driving, lacking, rival=best)
-    assert max(asked) < lacking.driving.samples
+    assert max(settled_on) < lacking.driving.samples
     assert found is not None
     assert not found.converged
     assert far_below(found.log_likelihood, best.log_likelihood)
     # Without a rival it is followed to where it has gained what it can.
     assert refine_above(model, lacking.driving, lacking) is not None
-    assert max(asked) == lacking.driving.samples
+    assert max(settled_on) == lacking.driving.samples
 
 
 def test_a_hidden_lag_that_was_not_followed_is_found_when_asked_for(
