@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -121,14 +121,18 @@ def checked(
     def of(
         some: Sequence[Readings],
         where: Sequence[Stretch],
-        without: Sequence[str],
+        without: Collection[str],
         begin: dict[str, float] | None = None,
     ) -> Estimate:
         slow = means if some is readings else [averaged(r, _MEAN_S) for r in some]
         names = [name for name in _names(have) if name not in without]
         return estimate(slow, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
 
-    def explained(found: Estimate, lacks: Sequence[str]) -> tuple[Estimate, Faults]:
+    @cache  # a second search asks for most of them again
+    def of_all(lacks: frozenset[str]) -> Estimate:
+        return of(readings, stretches, lacks)
+
+    def explained(found: Estimate, lacks: frozenset[str]) -> tuple[Estimate, Faults]:
         parts = []
         for some in cut(stretches):
             with suppress(SysidError):  # a part may hold too little
@@ -137,7 +141,7 @@ def checked(
         for left in range(_SEARCHES, -1, -1):
             rivals = {}
             for without in doubted([fault.name for fault in faults if fault.found]):
-                other = of(readings, stretches, (*lacks, *without))
+                other = of_all(lacks.union(without))
                 rivals[without] = Rival(other, preferred(means, found, other))
             faults = told_of(found, parts=parts, rivals=rivals)
             best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
@@ -150,14 +154,15 @@ def checked(
             faults = told_of(found, parts=parts)
         return found, faults
 
-    found = of(readings, stretches, tuple(SWINGS))
+    lacks = frozenset(SWINGS)
+    found = of_all(lacks)
     faults = told_of(found)
     if not enough(found, faults):
-        found, faults = explained(found, tuple(SWINGS))
-        if {*SWINGS} <= {*_names(have)}:
-            swinging = of(readings, stretches, ())
+        found, faults = explained(found, lacks)
+        if lacks <= {*_names(have)}:
+            swinging = of_all(frozenset())
             if preferred(means, swinging, found) > _SWINGS:
-                found, faults = explained(swinging, ())
+                found, faults = explained(swinging, frozenset())
     return SensorCheck(
         logs=tuple(together),
         faults=faults,

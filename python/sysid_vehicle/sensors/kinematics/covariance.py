@@ -12,6 +12,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
 from .equations import Readings
+from .motion import IntArray
 from .system import Linearised, Normal
 
 _BLOCKS_S = (2.0, 10.0)  # errors further apart are taken as independent
@@ -20,8 +21,17 @@ _BLOCKS_S = (2.0, 10.0)  # errors further apart are taken as independent
 def covariance_of(readings: Sequence[Readings], system: Linearised, normal: Normal) -> FloatArray:
     """Covariance of the faults, with the errors' dependence over time allowed for."""
     inverse = as_float64(np.linalg.inv(normal.information))
+    scores = [
+        (system.by_faults[c] - system.motion[c] @ normal.across)
+        * (system.weights[c] * system.white[c])[:, None]
+        for c in (r.channel for r in readings)
+    ]
+    stretch, time_s, of_all = (
+        np.concatenate(parts)
+        for parts in ([r.stretch for r in readings], [r.time_s for r in readings], scores)
+    )
     robust = [
-        np.diag(inverse @ _meat(readings, system, normal.across, block) @ inverse)
+        np.diag(inverse @ _meat(stretch, np.floor(time_s / block), of_all) @ inverse)
         for block in _BLOCKS_S
     ]
     return inflated(inverse, np.max(robust, axis=0))
@@ -35,22 +45,11 @@ def inflated(naive: FloatArray, robust: FloatArray) -> FloatArray:
     return result
 
 
-def _meat(
-    readings: Sequence[Readings], system: Linearised, across: FloatArray, block_s: float
-) -> FloatArray:
+def _meat(stretch: IntArray, block: FloatArray, scores: FloatArray) -> FloatArray:
     """Sum over blocks of time of the squared scores of the faults, free of the motion."""
-    k = across.shape[1]
-    sums: dict[tuple[int, int], FloatArray] = {}
-    for r in readings:
-        c = r.channel
-        own = system.by_faults[c] - system.motion[c] @ across
-        scores = own * (system.weights[c] * system.white[c])[:, None]
-        block = np.floor(r.time_s / block_s).astype(np.intp)
-        keys, at = np.unique(np.stack([r.stretch, block], 1), axis=0, return_inverse=True)
-        total = np.zeros((len(keys), k))
-        np.add.at(total, np.ravel(at), scores)
-        for key, row in zip(map(tuple, keys.tolist()), total, strict=True):
-            sums[key] = sums.get(key, 0.0) + row
-    stacked = np.array(list(sums.values()))
-    result: FloatArray = stacked.T @ stacked
+    order = np.lexsort((block, stretch))
+    change = np.diff(stretch[order]) + np.abs(np.diff(block[order]))
+    first = np.concatenate(([0], np.flatnonzero(change) + 1))
+    sums = np.add.reduceat(scores[order], first, axis=0)
+    result: FloatArray = sums.T @ sums
     return result

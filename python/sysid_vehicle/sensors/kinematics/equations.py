@@ -129,6 +129,27 @@ def predict(
     by_fault : dict of ndarray, shape (n,)
         Of the faults in `faults` that move this channel.
     """
+    expected, blocks, by_fault = _read(readings, grid, x, faults)
+    columns = np.concatenate([c for c, _ in blocks], axis=1)
+    weights = np.concatenate([w for _, w in blocks], axis=1)
+    n, k = columns.shape
+    by_motion = scipy.sparse.csr_matrix(
+        (weights.ravel(), columns.ravel(), np.arange(0, n * k + 1, k)), shape=(n, grid.size)
+    )
+    return expected, by_motion, by_fault
+
+
+def moved_by(
+    readings: Readings, grid: Grid, x: FloatArray, faults: dict[str, float]
+) -> dict[str, FloatArray]:
+    """As `predict`: the derivatives against the faults alone."""
+    return _read(readings, grid, x, faults)[2]
+
+
+def _read(
+    readings: Readings, grid: Grid, x: FloatArray, faults: dict[str, float]
+) -> tuple[FloatArray, list[tuple[IntArray, FloatArray]], dict[str, FloatArray]]:
+    """What the channel should read, how the motion moves it in blocks of columns, and faults."""
     name = readings.channel
     late_s = faults.get(f"delay.{name}", 0.0)
     if name in _SPEEDS:
@@ -153,13 +174,7 @@ def predict(
         by_fault[f"gain.{name}"] -= (1.0 - share) ** 2 * lean_s * rate
     if name in _SPEEDS:
         by_fault["delay.speeds"] = -rate
-    columns = np.concatenate([c for c, _ in blocks], axis=1)
-    weights = np.concatenate([w for _, w in blocks], axis=1)
-    n, k = columns.shape
-    by_motion = scipy.sparse.csr_matrix(
-        (weights.ravel(), columns.ravel(), np.arange(0, n * k + 1, k)), shape=(n, grid.size)
-    )
-    return expected, by_motion, {key: d for key, d in by_fault.items() if key in faults}
+    return expected, blocks, {key: d for key, d in by_fault.items() if key in faults}
 
 
 def lean(channel: str, faults: dict[str, float]) -> tuple[float, float]:

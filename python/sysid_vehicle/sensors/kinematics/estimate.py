@@ -26,6 +26,8 @@ from .colour import Colour, fit_colour, neighbours
 from .covariance import covariance_of, inflated
 from .equations import FAULTS, Readings, predict
 from .motion import QUICK, SLOW, Grid
+from .one_sided import OneSided
+from .road import Unevenness
 from .system import Band, Linearised, drawn, linearise, normal_equations
 
 _ROUNDS = 30
@@ -37,9 +39,8 @@ _LARGEST_DELAY_S = 0.28  # the splines reach no farther
 _SETTLED = 0.03  # of a standard deviation
 # Second derivatives of speeds and yaw rate: so large that they matter only without readings.
 _ROUGH = {"vx": 300.0, "vy": 300.0, "yaw": 100.0}
-_ROAD_MPS2 = 0.05  # change of gravity along or across within a second, to begin with
-_LEAST_ROAD_MPS2 = 1e-4
-_ROAD_ROUNDS = 3  # the road is learned in every third round only
+_ROAD_ROUNDS = 3  # the road is learned in every third round at least
+_NEARLY = 0.3  # of a standard deviation: near enough to learn it
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,28 +158,27 @@ def estimate(
     most = np.array([FAULTS[name].most for name in names])
     runs = {r.channel: neighbours(r.stretch, r.time_s) for r in readings}
     x, colours = _begin(readings, grid, floors)
-    road = dict.fromkeys(SLOW, _ROAD_MPS2)
-    steps = {signal: grid.steps(signal) for signal in SLOW}
+    uneven = {signal: Unevenness(grid.steps(signal)) for signal in SLOW}
+    gains = OneSided(names)
     settled = False
     for count in range(1, _ROUNDS + 1):
         check_time()
-        system = linearise(readings, grid, x, faults, colours, runs)
-        system = system.with_faults_at(
-            linearise(readings, grid, grid.smoothed(x), faults, colours, runs)
-        )
+        system = linearise(readings, grid, x, faults, colours, runs, calm=grid.smoothed(x))
+        road = {signal: slope.std_mps2 for signal, slope in uneven.items()}
         rows = _rows(readings, grid, road)
         now = np.array([faults[name] for name in names])
         # Cauchy's prior at its present curvature.
         prior = np.diag(2.0 / (typical**2 + now**2) + most**-2.0)
         normal = normal_equations(system, rows, x, prior, now)
         std = np.sqrt(np.diag(np.linalg.inv(normal.information)))
-        step = _bounded(normal.step, names, faults)
+        step = _bounded(gains.step(normal, now), names, faults)
         dx = normal.motion_step - normal.across @ step
         x = x + dx
         for name, change in zip(names, step, strict=True):
             faults[name] += float(change)
         moved = float(np.max(np.abs(step) / std, initial=0.0))
-        settled = count >= _LEAST_ROUNDS and moved < _SETTLED
+        at_rest = all(slope.at_rest for slope in uneven.values())
+        settled = count >= _LEAST_ROUNDS and moved < _SETTLED and at_rest
         if settled:
             break
         # The same numbers in each round: then the rounds converge.
@@ -189,9 +189,11 @@ def estimate(
                 left = system.errors[c] - system.raw_motion[c] @ dx - system.raw_faults[c] @ step
                 errors = left[None, :] - (system.raw_motion[c] @ varied).T
                 colours[c] = fit_colour(errors, runs[c], floors[c], _ORDER)
-            if count % _ROAD_ROUNDS == 0:
-                for signal in SLOW:
-                    road[signal] = _road(steps[signal], x, normal.band, road[signal])
+        if moved < _NEARLY or count % _ROAD_ROUNDS == 0:
+            for slope in uneven.values():
+                slope.improve(x, normal.band)
+                if not slope.at_rest:
+                    gains.forget()
     # On a smooth motion delays are not told from places by what is noise. Faults that act alike
     # where there are none look told apart where the estimate has left zero: a delay at constant
     # speed is the place of the IMU, up to the square of the delay.
@@ -325,18 +327,6 @@ def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -
             most = 10.0 * FAULTS[name].typical
             result[i] = float(np.clip(step[i], -most, most))
     return result
-
-
-def _road(rows: scipy.sparse.csr_matrix, x: FloatArray, band: Band, now: float) -> float:
-    """New standard deviation of the change within a second (EM, exact)."""
-    spread = band.variances(rows) if rows.shape[0] else np.zeros(1)
-    change = rows @ x
-    # The step of EM is too short where the road hardly moves: MacKay's is taken where it is safe.
-    seen = rows.shape[0] - float(spread.sum()) / now**2
-    em = float(np.mean(change**2 + spread))
-    quick = float(change @ change) / max(seen, 0.3 * rows.shape[0])
-    best = min(em, quick) if seen > 0.05 * rows.shape[0] else em
-    return float(np.sqrt(max(best, _LEAST_ROAD_MPS2**2)))
 
 
 def _offsets(

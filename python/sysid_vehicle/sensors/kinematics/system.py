@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -11,10 +11,11 @@ import scipy
 from ..._common.arrays import FloatArray, as_float64
 from ...errors import NumericalError
 from .colour import Colour
-from .equations import Readings, predict
+from .equations import Readings, moved_by, predict
 from .motion import Grid, IntArray
 
 _AT_ONCE = 32  # right-hand sides that are solved for together
+_NOTHING = 1e-18  # of a variance
 _OUTLIER = 4.0  # whitened errors beyond count less (Huber)
 
 
@@ -46,17 +47,32 @@ class Band:
         there is nothing.
         """
         rows = rows.sorted_indices()
-        first = rows.indices[rows.indptr[:-1]]
+        first, last = rows.indices[rows.indptr[:-1]], rows.indices[rows.indptr[1:] - 1]
         order = np.argsort(first, kind="stable")
         found = np.empty(rows.shape[0])
         for some in (order[k : k + _AT_ONCE] for k in range(0, order.size, _AT_ONCE)):
             begin = int(first[some[0]])
-            right = np.asfortranarray(rows[some, begin:].toarray().T)
-            half, info = scipy.linalg.lapack.dtbtrs(self.factor[:, begin:], right, uplo="L")
+            end = int(last[some].max()) + 1
+            found[some] = self._squares(rows[some, begin:], end - begin, begin)
+        return as_float64(found)
+
+    def _squares(self, rows: scipy.sparse.csr_matrix, filled: int, begin: int) -> FloatArray:
+        """Sums of the squares of what the factor makes of rows that begin at coefficient `begin`.
+
+        What it makes of them dies away: once a width of it adds nothing any more, nothing does.
+        """
+        length = filled
+        while True:
+            length = min(2 * (length + self.width), rows.shape[1])
+            right = np.asfortranarray(rows[:, :length].toarray().T)
+            factor = self.factor[:, begin : begin + length]
+            half, info = scipy.linalg.lapack.dtbtrs(factor, right, uplo="L")
             if info:
                 raise NumericalError("the posterior of the motion is singular")
-            found[some] = np.sum(half**2, axis=0)
-        return as_float64(found)
+            squares = as_float64(np.sum(half**2, axis=0))
+            end = np.sum(half[-self.width :] ** 2, axis=0)
+            if length == rows.shape[1] or np.all(end <= _NOTHING * squares):
+                return squares
 
     def draw(self, z: FloatArray) -> FloatArray:
         """Solve with the transposed factor: normal numbers become draws of the posterior."""
@@ -84,10 +100,6 @@ class Linearised:
     white: dict[str, FloatArray]
     weights: dict[str, FloatArray]
 
-    def with_faults_at(self, other: Linearised) -> Linearised:
-        """The same errors, with what faults do to the readings taken from another motion."""
-        return replace(self, raw_faults=other.raw_faults, by_faults=other.by_faults)
-
 
 def linearise(
     readings: Sequence[Readings],
@@ -96,13 +108,20 @@ def linearise(
     faults: dict[str, float],
     colours: dict[str, Colour],
     runs: dict[str, IntArray],
+    *,
+    calm: FloatArray | None = None,
 ) -> Linearised:
-    """Residuals of all readings and their derivatives, at this motion and these faults."""
+    """Residuals of all readings and their derivatives, at this motion and these faults.
+
+    What faults do to the readings is taken from the motion `calm`, where it is given.
+    """
     names = list(faults)
     system = Linearised({}, {}, {}, {}, {}, {}, {})
     for r in readings:
         c = r.channel
         expected, j, by = predict(r, grid, x, faults)
+        if calm is not None:
+            by = moved_by(r, grid, calm, faults)
         jt = np.column_stack([by.get(name, np.zeros(expected.size)) for name in names])
         a = colours[c].whitener(runs[c])
         error = r.values - expected
@@ -135,6 +154,16 @@ class Normal:
     step: FloatArray
     motion_step: FloatArray
 
+    def step_beside(self, fixed: dict[int, float]) -> FloatArray:
+        """Gauss-Newton step of the faults where some take a step that is given."""
+        free = np.array([i for i in range(self.step.size) if i not in fixed], dtype=np.intp)
+        step = np.zeros(self.step.size)
+        for i, value in fixed.items():
+            step[i] = value
+        left = self.information @ (self.step - step)
+        step[free] = np.linalg.solve(self.information[np.ix_(free, free)], left[free])
+        return step
+
 
 def normal_equations(
     system: Linearised,
@@ -156,18 +185,23 @@ def normal_equations(
         Information of the prior of the faults, about zero.
     faults : ndarray, shape (n,)
     """
-    h, b = (rows.T @ rows), -(rows.T @ (rows @ x))
-    hxt, htt, bt = np.zeros((x.size, faults.size)), prior.copy(), -prior @ faults
-    for c, j in system.motion.items():
-        wj = (scipy.sparse.diags(system.weights[c]) @ j).T.tocsr()
-        h = h + wj @ j
-        b = b + wj @ system.white[c]
-        hxt += wj @ system.by_faults[c]
-        wt = system.weights[c][:, None] * system.by_faults[c]
-        htt += wt.T @ system.by_faults[c]
-        bt += wt.T @ system.white[c]
+    # With the roots of the weights all channels are one product.
+    roots = {c: np.sqrt(weight) for c, weight in system.weights.items()}
+    j = scipy.sparse.vstack(
+        [rows, *(scipy.sparse.diags(roots[c]) @ m for c, m in system.motion.items())], format="csr"
+    )
+    jt = np.concatenate([np.zeros((rows.shape[0], faults.size)), *_rooted(system.by_faults, roots)])
+    left = np.concatenate([-(rows @ x), *_rooted(system.white, roots)])
+    back = j.T.tocsr()
+    h, b, hxt = back @ j, back @ left, back @ jt
+    htt, bt = prior + jt.T @ jt, jt.T @ left - prior @ faults
     band = Band(h)
     across = band.solve(hxt)
     information = as_float64(htt - hxt.T @ across)
     step = as_float64(np.linalg.solve(information, bt - across.T @ b))
     return Normal(band, across, information, step, band.solve(b))
+
+
+def _rooted(of: dict[str, FloatArray], roots: dict[str, FloatArray]) -> list[FloatArray]:
+    """Rows of each channel, times the roots of their weights."""
+    return [as_float64((values.T * roots[c]).T) for c, values in of.items()]
