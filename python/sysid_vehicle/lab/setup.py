@@ -99,7 +99,8 @@ class Setup:
         """Drive any model, with mass and geometry known and the tyres guessed.
 
         Wheel forces are those of an ordinary car, and larger where these would not accelerate a
-        heavy one by 2.5 and brake it by 4 m/s2.
+        heavy one by 2.5 and brake it by 4 m/s2. What the observer takes for unknown forces is
+        larger by as much.
 
         Parameters
         ----------
@@ -113,7 +114,13 @@ class Setup:
             1.0, mass_kg * _DRIVES_MPS2 / _FORCE.most, -mass_kg * _BRAKES_MPS2 / _FORCE.least
         )
         force = Actuator(more * _FORCE.least, more * _FORCE.most, more * _FORCE.rate_limit)
-        return cls(plant, Nominal.of(plant.vehicle, stiffness), force=force)
+        process = tuple(v * (more**2 if i > 2 else 1.0) for i, v in enumerate(Online.process))
+        return cls(
+            plant,
+            Nominal.of(plant.vehicle, stiffness),
+            force=force,
+            observer=Online(process=process),
+        )
 
     @classmethod
     def default(cls) -> Setup:

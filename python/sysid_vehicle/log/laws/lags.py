@@ -97,7 +97,8 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     usual = max(_USUAL_S, _LEVER_M / speed)
     y, x = sides(**{_SIDE[name]: 1.0})(lags[name].seconds)
     late = regress(y[usable], x[usable], mean, spread)
-    scale = _scale(*(side[usable] for side in sides()(0.0)), spread, late.scale)
+    slides, felt = sides()(0.0)
+    scale = _scale(slides[usable], felt[usable], spread, late.scale)
     if scale is not None:
         return [scale]
     if not _told(lags[name], usual, usual, _MIN_GAIN[name]):
@@ -110,9 +111,7 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     return [_note(name, others[name], lags[name])]
 
 
-def _scale(
-    y: FloatArray, x: FloatArray, spread: FloatArray, most: float
-) -> Contradiction | None:
+def _scale(y: FloatArray, x: FloatArray, spread: FloatArray, most: float) -> Contradiction | None:
     """Tell of a lateral speed in another unit where that explains more than any lag does.
 
     Parameters
