@@ -18,9 +18,8 @@ from ...vehicle import GRAVITY_MPS2, Vehicle
 from .suggestion import ground_m
 
 _SLOWER = (1.0, 0.7, 0.5, 0.35)  # of the speed, where the ground is too small
-_LORRY_KG, _LORRY_MPS = 3500.0, 25.0
-_BELOW_TIPPING = 0.6
-_LOWEST_M = 1e-3  # of a centre of gravity: a point on the road never tips
+_LORRY_KG, _LORRY_MPS = 3500.0, 25.0  # by law
+_BELOW_TIPPING = 0.6  # no claim depends on it: what is proposed to a driver
 _EASIER = (1.0, 0.8, 0.6)  # of the lateral acceleration, where a manoeuvre asks too much
 
 
@@ -72,9 +71,11 @@ class DriveLimits:
         speed = length**0.5 * cls.speed_mps
         if vehicle.mass_kg > _LORRY_KG:
             speed = min(speed, _LORRY_MPS)
-        track = min(vehicle.track_front_m, vehicle.track_rear_m)
-        tips_mps2 = GRAVITY_MPS2 * track / (2.0 * max(vehicle.cg_height_m, _LOWEST_M))
-        lateral = min(cls.lateral_mps2, _BELOW_TIPPING * tips_mps2)
+        lateral = cls.lateral_mps2
+        if vehicle.cg_height_m > 0.0:
+            track = min(vehicle.track_front_m, vehicle.track_rear_m)
+            tips_mps2 = 0.5 * GRAVITY_MPS2 * track / vehicle.cg_height_m
+            lateral = min(lateral, _BELOW_TIPPING * tips_mps2)
         return cls(**{"speed_mps": speed, "lateral_mps2": lateral, **others})
 
     def hold(self, drive: Drive) -> bool:
