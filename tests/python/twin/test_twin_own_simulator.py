@@ -87,9 +87,9 @@ def away(run: Observation) -> float:
 
 
 def test_the_interval_of_a_mass_found_by_accelerations_holds_it() -> None:
-    """What steps to new guesses left in the speed made the mean square 3.6, of other seeds."""
-    runs = [found(*driven(seed), input_std=0.0) for seed in SEEDS]
-    assert np.mean([away(run) ** 2 for run in runs]) < 2.2
+    """With a start taken as exact, 0.1 m/s made the mean square 7.9."""
+    runs = [found(*driven(seed, speed=18.1), input_std=0.0) for seed in SEEDS]
+    assert np.mean([away(run) ** 2 for run in runs]) < 2.0
     assert max(run.spread["mass_kg"] for run in runs) < 0.01 * MASS_KG
 
 
