@@ -70,14 +70,19 @@ def main() -> None:
             "two twins side by side",
             Observer(
                 batch=SideBySide(
-                    unknowns("mass_kg", around=SPORTS_CAR.design), {"ax_mps2": 0.1}, input_std=0.0
+                    unknowns("mass_kg", around=SPORTS_CAR.design),
+                    {"ax_mps2": 0.1},
+                    input_std=0.0,
+                    start_std=0.0,
                 )
             ),
         ),
         (
             "a third for doubted torques",
             Observer(
-                batch=SideBySide(unknowns("mass_kg", around=SPORTS_CAR.design), {"ax_mps2": 0.1})
+                batch=SideBySide(
+                    unknowns("mass_kg", around=SPORTS_CAR.design), {"ax_mps2": 0.1}, start_std=0.0
+                )
             ),
         ),
     ):

@@ -201,6 +201,7 @@ def _comparison(c: Comparison, fit: Fit) -> dict[str, Any]:
                 "speed_mps": list(r.speed_mps),
                 "lateral_acceleration_mps2": list(r.lateral_mps2),
                 "share": r.share,
+                "error": r.error,
             }
             for r in c.regions
         ],

@@ -32,19 +32,24 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--nuisances", action="store_true", help="fit offsets that every measured log has"
     )
-    parser.add_argument(
-        "--top-speed",
-        type=float,
-        metavar="M/S",
-        help=f"highest speed (default: {_USUAL.speed_mps:g}, less for a small car)",
-    )
     limits = {
-        "--lateral": (_USUAL.lateral_mps2, "M/S2", "highest lateral acceleration"),
-        "--duration": (_USUAL.duration_s, "S", "longest drive"),
+        "--top-speed": (
+            _USUAL.speed_mps,
+            "M/S",
+            "highest speed",
+            ", less for a small car or a lorry",
+        ),
+        "--lateral": (
+            _USUAL.lateral_mps2,
+            "M/S2",
+            "highest lateral acceleration",
+            ", less for a high car",
+        ),
+        "--duration": (_USUAL.duration_s, "S", "longest drive", ""),
     }
-    for name, (usual, unit, what) in limits.items():
-        told = f"{what} (default: %(default)s)"
-        parser.add_argument(name, type=float, default=usual, metavar=unit, help=told)
+    for name, (usual, unit, what, less) in limits.items():
+        told = f"{what} (default: {usual:g}{less})"
+        parser.add_argument(name, type=float, metavar=unit, help=told)
     parser.add_argument(
         "--area", nargs=2, type=float, metavar=("LENGTH", "WIDTH"), help="ground there is [m]"
     )
@@ -64,10 +69,14 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     model = model.add(*args.effects)
     logs = read_logs(args.logs, args, model.vehicle)
     area = None if args.area is None else (args.area[0], args.area[1])
-    known = {"lateral_mps2": args.lateral, "area_m": area, "duration_s": args.duration}
-    if args.top_speed is not None:
-        known["speed_mps"] = args.top_speed
-    limits = DriveLimits.usual(model.vehicle, **known)
+    known = {
+        "speed_mps": args.top_speed,
+        "lateral_mps2": args.lateral,
+        "area_m": area,
+        "duration_s": args.duration,
+    }
+    given = {name: value for name, value in known.items() if value is not None}
+    limits = DriveLimits.usual(model.vehicle, **given)
     fit = identify(model, logs)
     found = suggest_manoeuvre(fit, *args.between, limits=limits)
     print(found)

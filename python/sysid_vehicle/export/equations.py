@@ -102,7 +102,9 @@ def equations(model: Model) -> Equations:
     if written.foreign():
         foreign = [e.id for e in model.parts if _Written(_with_only(model, e)).foreign()]
         raise InvalidInput(
-            f"{', '.join(foreign)}: cannot be exported; drop it first: model.drop('{foreign[0]}')"
+            f"{', '.join(foreign)}: cannot be exported; drop it first: model.drop('{foreign[0]}'), "
+            f"as it reads the time, a channel of the log or how fast the steering turns, and what "
+            f"is exported is told steering angle and force alone"
         )
     return written.equations()
 

@@ -17,6 +17,7 @@ from .parts import Actuator, Controller, Nominal, Online, Sensors, Simulator
 
 _FORCE = Actuator(-8000.0, 6000.0, 60e3)
 _STEER = Actuator(-0.35, 0.35, 2.0)
+_DRIVES_MPS2, _BRAKES_MPS2 = 2.5, 4.0  # what a car can at least, be it a lorry
 
 
 def _example_plant() -> Model:
@@ -97,6 +98,10 @@ class Setup:
     def of(cls, plant: Model, stiffness: float = 50.0) -> Setup:
         """Drive any model, with mass and geometry known and the tyres guessed.
 
+        Wheel forces are those of an ordinary car, and larger where these would not accelerate a
+        heavy one by 2.5 and brake it by 4 m/s2. What the observer takes for unknown forces is
+        larger by as much.
+
         Parameters
         ----------
         plant : Model
@@ -104,7 +109,18 @@ class Setup:
         stiffness : float
             Guess of both axles' cornering stiffness per load [1/rad].
         """
-        return cls(plant, Nominal.of(plant.vehicle, stiffness))
+        mass_kg = plant.vehicle.mass_kg
+        more = max(
+            1.0, mass_kg * _DRIVES_MPS2 / _FORCE.most, -mass_kg * _BRAKES_MPS2 / _FORCE.least
+        )
+        force = Actuator(more * _FORCE.least, more * _FORCE.most, more * _FORCE.rate_limit)
+        process = tuple(v * (more**2 if i > 2 else 1.0) for i, v in enumerate(Online.process))
+        return cls(
+            plant,
+            Nominal.of(plant.vehicle, stiffness),
+            force=force,
+            observer=Online(process=process),
+        )
 
     @classmethod
     def default(cls) -> Setup:

@@ -249,7 +249,7 @@ def _twin(drive: Drive14, readings: Readings, gains: Mapping[str, float], law: L
         corrections.append(StateGain(channel, channel, gains["wheel"]))
     if law == "side_by_side":
         noise = {"ax_mps2": readings.noise["ax_mps2"]}
-        batch = SideBySide(unknowns("mass_kg", around=load), noise, input_std=0.0)
+        batch = SideBySide(unknowns("mass_kg", around=load), noise, input_std=0.0, start_std=0.0)
         observer = Observer(gains=corrections, batch=batch)
     else:
         observer = Observer(gains=corrections, laws=[mass_law(gains["mass"], around=load)])

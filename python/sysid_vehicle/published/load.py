@@ -178,7 +178,9 @@ def experiment(
         told[:, _TORQUES] *= 1.0 + torque_error
     if law == "side_by_side":
         noise = {c: max(readings.noise[c], _NOISE_FLOOR[c]) for c in channels}
-        observer = Observer(batch=SideBySide(looked_for, noise, input_std=torque_std))
+        # The twin starts exactly where the car does.
+        batch = SideBySide(looked_for, noise, input_std=torque_std, start_std=0.0)
+        observer = Observer(batch=batch)
     else:
         observer = Observer(laws=[_law(law, snr, n) for n in names])
     speed = float(drive["vx_mps"][0])

@@ -20,7 +20,7 @@ from .._common.typed import check_types, typed, typed_fields
 from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES, NOMINAL_SUV, Load
 from .checks import check_apart
-from .drives import INPUTS
+from .kept import forces_among, kept_states
 
 # Of the first guess's size: how far the twins stand apart, how wrong the guess may be, limits.
 _APART, _LIMIT = 0.01, 0.45
@@ -30,7 +30,6 @@ _PRODUCT = 0.03  # of the root of its two moments
 INPUT_SCALE = "input_scale"
 _ESTIMATED, _CONSIDERED, _START = 0.0, 1.0, 2.0  # as the core's binding reads them
 _START_STEP = 0.01  # between the twins, of the standard deviation
-_TORQUES = INPUTS[2:10]
 _ANGULAR = {
     "jxx_kgm2": "roll_rate_radps",
     "jyy_kgm2": "pitch_rate_radps",
@@ -232,15 +231,17 @@ class SideBySide:
         not known so well, tell the two apart. So the factor is not estimated but considered: where
         ``mass_kg`` is looked for and the twin takes such inputs, the spreads hold what its
         uncertainty does to the estimates. It costs one twin more. Zero: the inputs are exact.
-    uncertain_inputs : sequence of str
-        Inputs that have this factor, those of them that the twin takes; not the steering.
+    uncertain_inputs : sequence of str, optional
+        Inputs that have this factor, those of them that the twin takes; not the steering. By
+        default the torques of the built-in car, and of a twin that takes none of these all whose
+        names end in ``_n`` or ``_nm``; where there are none a warning says so.
     start_std : float
         Standard deviation of the first value of a state that is compared, in its unit. Without a
         gain that corrects it a speed keeps for long where it began, and what the steps to each new
         guess left in it; either would pass for another mass. So where such a state is compared its
-        start is looked for too; that costs one twin more. Angular rates and ``vy_mps``, which tyres
-        hold, forget their start within a second: they have none. Zero: the twin starts exactly
-        where the car does.
+        start is looked for too, and that of ``vx_mps`` where an acceleration is; that costs one
+        twin more. Angular rates and ``vy_mps``, which tyres hold, forget their start within a
+        second: they have none. Zero: the twin starts exactly where the car does.
 
     Raises
     ------
@@ -257,7 +258,7 @@ class SideBySide:
     gentle_s: float = 20.0
     high_pass_hz: Mapping[str, float] = field(default_factory=dict)
     input_std: float = 0.03
-    uncertain_inputs: Sequence[str] = _TORQUES
+    uncertain_inputs: Sequence[str] | None = None
     start_std: float = 1.0
 
     @typed_fields
@@ -279,15 +280,22 @@ class SideBySide:
                 )
         if not 0.0 <= self.input_std < 1.0:
             raise InvalidInput(f"input_std = {self.input_std!r}; give a part from 0 to 1")
-        if any(name.startswith("steer") for name in self.uncertain_inputs):
+        if any(name.startswith("steer") for name in self.uncertain_inputs or ()):
             raise InvalidInput("uncertain_inputs: the steering has no factor; leave it out")
 
     def scaled(self, inputs: Sequence[str]) -> list[int]:
         """Positions of the uncertain inputs among a twin's, none if no factor is considered."""
-        looked_for = any(u.parameter == "mass_kg" for u in self.unknowns)
-        if not looked_for or self.input_std == 0.0:
+        if not self.doubts_inputs:
             return []
-        return [i for i, name in enumerate(inputs) if name in self.uncertain_inputs]
+        uncertain = self.uncertain_inputs
+        if uncertain is None:
+            uncertain = forces_among(inputs)
+        return [i for i, name in enumerate(inputs) if name in uncertain]
+
+    @property
+    def doubts_inputs(self) -> bool:
+        """Whether forces and torques are to count as uncertain."""
+        return self.input_std > 0.0 and any(u.parameter == "mass_kg" for u in self.unknowns)
 
     def looked_for(self, inputs: Sequence[str]) -> tuple[Unknown, ...]:
         """Unknowns for a twin with these inputs, last the factor of the uncertain ones, if any."""
@@ -310,8 +318,7 @@ class SideBySide:
         """
         if self.start_std == 0.0:
             return {}
-        kept = [kept_state(channel) for channel in self.channels]
-        step = _START_STEP * self.start_std
+        step, kept = _START_STEP * self.start_std, kept_states(self.channels)
         return {name: step for name in kept if name in states and name not in corrected}
 
     def start_steps(
@@ -380,14 +387,6 @@ def inertia_law(
     value = getattr(around, parameter)
     given: dict[str, object] = {"lower": (1.0 - _LIMIT) * value, "upper": (1.0 + _LIMIT) * value}
     return ParameterLaw(parameter, _ANGULAR[parameter], gain, **{**given, **changes})  # type: ignore[arg-type]
-
-
-def kept_state(channel: str) -> str:
-    """The state that a channel reads and that keeps what it began with; empty if there is none."""
-    if channel.startswith("wheel_speed_"):
-        return "vx_mps"  # wheels roll
-    forgets = channel == "vy_mps" or channel.endswith("_rate_radps")
-    return "" if forgets else channel
 
 
 def place_of(name: str, known: Sequence[str] | Mapping[str, str], what: str) -> int:

@@ -22,7 +22,8 @@ from .car import LOAD_NAMES, Load, TwinCar
 from .checks import checked_rows, checked_step, checked_stride
 from .drives import INPUTS, OUTPUTS, WHEELS
 from .failing import check_start
-from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, kept_state, place_of
+from .kept import kept_state
+from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, place_of
 from .readings import READINGS, Readings
 from .residuals import ChannelResidual, Shown, contradictions, residual_of
 

@@ -21,11 +21,11 @@ import numpy as np
 from .._common.arrays import FloatArray, as_float64
 from .._common.progress import doing
 from .._common.typed import typed
-from ..errors import InvalidInput
+from ..errors import InvalidInput, warn
 from .car import LOAD_NAMES
 from .checks import check_heard, checked_rows, checked_step, checked_stride
 from .failing import all_numbers, blamed_on, check_repeats, check_start
-from .laws import kept_state
+from .kept import kept_state
 from .observer import Observation, Observer, judged
 from .residuals import Shown
 
@@ -142,6 +142,7 @@ def observe_with(
     _check(twin, observer)
     check_heard(observer.compared, measured)
     check_repeats(twin, inputs[0])
+    _say_if_exact(twin, observer)
     several = _Several(twin, observer, dt)
     check_start(observer.limits, dict(zip(names, several.estimate, strict=False)))
     kept: list[tuple[list[float], FloatArray, int]] = []
@@ -288,6 +289,18 @@ def _check(twin: Twin, observer: Observer) -> None:
             f"the twin has {len(twin.parameter_names)} parameters; give it at most "
             f"{_MOST_PARAMETERS}, those that are looked for"
         )
+
+
+def _say_if_exact(twin: Twin, observer: Observer) -> None:
+    """Warn where the spread of a mass cannot hold what its forces are not known by."""
+    batch = observer.batch
+    if batch is None or not batch.doubts_inputs or batch.scaled(twin.input_names):
+        return
+    warn(
+        f"mass_kg: no input of the twin ({', '.join(twin.input_names)}) is known as a force or a "
+        f"torque, so its spread takes them all as exact; name those that are not, "
+        f"uncertain_inputs=(...), or say input_std=0.0"
+    )
 
 
 def _left_behind(twin: Twin, observer: Observer) -> list[str]:

@@ -41,6 +41,7 @@ def drawn(seed: int) -> tuple[float, np.ndarray, np.ndarray]:
 
 def found(seed: int, *, gains: Any = (), first: float | None = None, **batch: Any) -> Any:
     mass, force, speed = drawn(seed)
+    batch = {"input_std": 0.0, **batch}  # the forces are exact
     observer = Observer(gains, batch=SideBySide([MASS], {"vx_mps": NOISE}, **batch))
     begun = twin(speed[0] if first is None else first)
     return observe_with(begun, force, {"vx_mps": speed}, observer), mass

@@ -14,10 +14,12 @@ from ...effects import length_beyond
 from ...errors import InvalidInput
 from ...manoeuvres import Manoeuvre, peak_lateral_mps2
 from ...simulate import Drive
-from ...vehicle import Vehicle
+from ...vehicle import GRAVITY_MPS2, Vehicle
 from .suggestion import ground_m
 
 _SLOWER = (1.0, 0.7, 0.5, 0.35)  # of the speed, where the ground is too small
+_LORRY_KG, _LORRY_MPS = 3500.0, 25.0  # by law
+_BELOW_TIPPING = 0.6  # no claim depends on it: what is proposed to a driver
 _EASIER = (1.0, 0.8, 0.6)  # of the lateral acceleration, where a manoeuvre asks too much
 
 
@@ -51,7 +53,12 @@ class DriveLimits:
 
     @classmethod
     def usual(cls, vehicle: Vehicle, **others: Any) -> DriveLimits:
-        """Limits that a car may have: the top speed of a small one goes as the root of its length.
+        """Limits that a car may have, known from its size.
+
+        The top speed of a small one goes as the root of its length. Above 3.5 t it is 25 m/s, for
+        lorries are limited to that (Council Directive 92/6/EEC). The lateral acceleration is at
+        most 0.6 of that at which a rigid body on this track would tip over: springs and tyres
+        give way, and the load may sway.
 
         Parameters
         ----------
@@ -61,7 +68,15 @@ class DriveLimits:
             Limits that are known.
         """
         length = min(length_beyond(vehicle.wheelbase_m), 1.0)
-        return cls(**{"speed_mps": length**0.5 * cls.speed_mps, **others})
+        speed = length**0.5 * cls.speed_mps
+        if vehicle.mass_kg > _LORRY_KG:
+            speed = min(speed, _LORRY_MPS)
+        lateral = cls.lateral_mps2
+        if vehicle.cg_height_m > 0.0:
+            track = min(vehicle.track_front_m, vehicle.track_rear_m)
+            tips_mps2 = 0.5 * GRAVITY_MPS2 * track / vehicle.cg_height_m
+            lateral = min(lateral, _BELOW_TIPPING * tips_mps2)
+        return cls(**{"speed_mps": speed, "lateral_mps2": lateral, **others})
 
     def hold(self, drive: Drive) -> bool:
         """Whether a drive stayed within them."""

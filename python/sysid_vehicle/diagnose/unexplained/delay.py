@@ -118,7 +118,8 @@ def delay(
     None where the input hardly moved. `complete` tells whether the model without a delay leaves
     nothing that depends on the driving.
     """
-    if float(np.std(inputs[:, which])) <= 0.0:
+    # The deviation of equal numbers need not be zero: their mean is rounded.
+    if float(np.ptp(inputs[:, which])) <= 0.0:
         return None
     put_in, late, first, ended, before, beyond = 0.0, inputs, evidence, False, 0.0, 0.0
     for _ in range(_ROUNDS):

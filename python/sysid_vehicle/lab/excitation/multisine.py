@@ -50,6 +50,11 @@ class MultiSine:
 
     def __post_init__(self) -> None:
         check_positive_fields(self, "peak", "period_s", "from_hz", "to_hz")
+        if self.from_hz > self.to_hz:
+            raise InvalidInput(
+                f"MultiSine: from_hz = {self.from_hz:g} lies above to_hz = {self.to_hz:g}; give "
+                f"the lower frequency first"
+            )
         if self.harmonics.size == 0:
             raise InvalidInput(
                 f"MultiSine: a period of {self.period_s:g} s has no line from {self.from_hz:g} to "

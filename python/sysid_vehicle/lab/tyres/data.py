@@ -18,6 +18,7 @@ from ..observer.observed import READINGS, refuse
 
 _INPUTS = ("fx_n", "steer_rad", "fz_front_n", "fz_rear_n")
 SHORTEST = 100
+_LONGEST_STEP_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -129,8 +130,11 @@ class TyreLog:
         y, u = as_float64(self.measurements), as_float64(self.inputs)
         object.__setattr__(self, "measurements", y)
         object.__setattr__(self, "inputs", u)
-        if not (np.isfinite(self.step_s) and self.step_s > 0.0):
-            raise InvalidInput(f"{self.name}: step_s is {self.step_s}; give seconds per sample")
+        if not 0.0 < self.step_s <= _LONGEST_STEP_S:
+            raise InvalidInput(
+                f"{self.name}: step_s is {self.step_s}; give seconds per sample, at most "
+                f"{_LONGEST_STEP_S:g}: a car answers to steering within 0.1 to 0.3 s"
+            )
         for what, a in (("measurements", y), ("inputs", u)):
             if a.ndim != 2 or a.shape[1] != 4 or len(a) != len(y):
                 raise InvalidInput(f"{self.name}: {what} has shape {a.shape}; expected (n, 4)")
@@ -144,6 +148,12 @@ class TyreLog:
         ):
             for i, channel in enumerate(names):
                 refuse(wrong[:, i], a[:, i], f"{self.name}: {channel}", self.step_s, remedy)
+        steered = float(np.abs(u[:, 1]).max())
+        if steered >= 0.5 * np.pi:
+            raise InvalidInput(
+                f"{self.name}: steer_rad reaches {steered:.3g}, and road wheels do not turn by a "
+                f"right angle; give radians, of the road wheels and not of the steering wheel"
+            )
         there = np.asarray(np.isfinite(y).any(axis=0))
         for i in (0, 2, 3):
             if not there[i]:
@@ -178,6 +188,14 @@ class TyreLog:
         name : str
         """
         u, f = as_float64(force_and_steer), as_float64(loads)
+        for what, a in (("force_and_steer", u), ("loads", f)):
+            if a.ndim != 2 or a.shape[1] != 2 or len(a) != len(u):
+                raise InvalidInput(f"{name}: {what} has shape {a.shape}; expected ({len(u)}, 2)")
+        if not 0 <= load_delay_samples < max(len(f), 1):
+            raise InvalidInput(
+                f"{name}: load_delay_samples = {load_delay_samples}; give a number from 0 to less "
+                f"than the {len(f)} samples"
+            )
         if load_delay_samples > 0:
             f = np.vstack([np.repeat(f[:1], load_delay_samples, axis=0), f[:-load_delay_samples]])
         return cls(step_s, as_float64(measurements), as_float64(np.column_stack([u, f])), name)

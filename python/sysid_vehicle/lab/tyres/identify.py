@@ -19,7 +19,7 @@ from ...identify.search.search import METHODS, Box
 from ...identify.search.settle import bottom, descend, settle, settle_finely
 from ...identify.search.starts import Runner, Search, Starts, space_filling
 from ...identify.search.walk import alternate
-from ...vehicle import slip_angles
+from ...vehicle import GRAVITY_MPS2, slip_angles
 from .data import GreyBoxVehicle, TyreLog
 from .fit import PARAMETERS, UNITS, Rival, TyreFit
 from .motion import TyreMotion
@@ -30,6 +30,7 @@ _THINNED = 3200  # samples that decide between starts
 _KINEMATIC_VY = 0.1  # how far integrated accelerations may be off [m/s]
 _LEVEL_NATS = 1.92  # half the 95 % quantile of chi-square with one degree of freedom
 _HOPELESS = 5.0  # nats that the way to the bottom of a valley does not gain
+_LOADS = 5.0
 _BEYOND = 25.0  # squared distance in standard deviations
 
 
@@ -85,6 +86,7 @@ def identify_tyres(
     """
     several = (logs,) if isinstance(logs, TyreLog) else tuple(logs)
     _check(several, method, starts)
+    _check_loads(several, vehicle)
     free = free_parameters(vehicle, residual_terms=residual_terms)
     p = first_point(start or {})
     box = box_of(free, {})
@@ -196,6 +198,18 @@ def _driven(
     slips = slip_angles(vehicle.lf_m, vehicle.lr_m, steer, v_x, v_y, r)
     front, rear = (float(np.percentile(np.abs(a), 99.5)) for a in slips)
     return front, rear
+
+
+def _check_loads(logs: Sequence[TyreLog], vehicle: GreyBoxVehicle) -> None:
+    """Refuse axle loads in another unit; wings may double them, and a paper may halve them."""
+    weight_n = vehicle.mass_kg * GRAVITY_MPS2
+    for log in logs:
+        loads_n = float(np.median(log.inputs[:, 2:].sum(axis=1)))
+        if not weight_n / _LOADS < loads_n < _LOADS * weight_n:
+            raise InvalidInput(
+                f"{log.name}: the axle loads are {loads_n:.4g} N together, where the car weighs "
+                f"{weight_n:.4g} N; give both in newtons, and the mass of the car that was driven"
+            )
 
 
 def _check(logs: tuple[TyreLog, ...], method: str, starts: int) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..._common.arrays import FloatArray
-from .laws import Contradiction
+from .laws import UNNAMED, Contradiction
 from .motion import Motion
 from .regression import Lag, Sides, find_lag, regress
 from .steering import several_frequencies, steering_lag
@@ -34,6 +36,8 @@ _MIN_GAIN = {
     "steer_rad": 1.1,
 }
 _MIN_GAIN_ELSE = 1.2
+_COHERENT = 0.5
+_SIDE = {"vy_mps": "vy", "yaw_rate_radps": "yaw", "ay_mps2": "ay"}
 _MIN_EVIDENCE = 30.0
 _EXCITED_MPS2 = 0.4
 
@@ -91,6 +95,12 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     name = max(lags, key=lambda key: lags[key].gain)
     speed = float(np.median(m.mean(vx)[usable]))
     usual = max(_USUAL_S, _LEVER_M / speed)
+    y, x = sides(**{_SIDE[name]: 1.0})(lags[name].seconds)
+    late = regress(y[usable], x[usable], mean, spread)
+    slides, felt = sides()(0.0)
+    scale = _scale(slides[usable], felt[usable], spread, late.scale)
+    if scale is not None:
+        return [scale]
     if not _told(lags[name], usual, usual, _MIN_GAIN[name]):
         return []
     others = {
@@ -99,6 +109,30 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
         "ay_mps2": "yaw_rate_radps",
     }
     return [_note(name, others[name], lags[name])]
+
+
+def _scale(y: FloatArray, x: FloatArray, spread: FloatArray, most: float) -> Contradiction | None:
+    """Tell of a lateral speed in another unit where that explains more than any lag does.
+
+    Parameters
+    ----------
+    y, x : ndarray, shape (n,), (n, 3)
+        Change of the lateral speed; specific force, minus speed times yaw rate, one.
+    spread : ndarray, shape (3,)
+        Of the prior for `x`.
+    most : float
+        What the best lag leaves of the change.
+    """
+    sliding = np.column_stack([x[:, 0] + x[:, 1], x[:, 1:]])
+    found = regress(y, sliding, np.zeros(3), np.array([np.inf, *spread[1:]]))
+    times = float(found.coefficients[0])
+    if found.scale >= most or found.coherence < _COHERENT or times < math.exp(UNNAMED):
+        return None
+    text = (
+        f"vy_mps: changes {times:.3g} times as much as ay_mps2 - vx_mps * yaw_rate_radps demands; "
+        f"check its unit (km/h make 3.6 times), and put its factor in the channel map"
+    )
+    return Contradiction("vy_mps", text)
 
 
 def _speed(m: Motion, usable: np.ndarray) -> list[Contradiction]:

@@ -24,7 +24,7 @@ OFFSET = 0.3  # of the steering angle, as a share of its size
 
 _NOT_ONE = 5.0  # deviations from the right unit before another is looked for
 _FITS = 3.0  # deviations within which another unit fits
-_UNNAMED = math.log(2.5)  # a scale that is farther off is refused although no unit explains it
+UNNAMED = math.log(2.5)  # a scale that is farther off is refused although no unit explains it
 
 Slip = tuple[str, str, str]
 Slipped = tuple[float, tuple[Slip, ...]]
@@ -183,7 +183,7 @@ def check_scale(
             f"{', or '.join(units)}: {formula} is {shown:.3g} instead of about 1, "
             f"{drive.place(driver)}; put {', or '.join(remedies)} in the channel map",
         )
-    if off > _NOT_ONE and abs(math.log(ratio)) > _UNNAMED:
+    if off > _NOT_ONE and abs(math.log(ratio)) > UNNAMED:
         raise Implausible(
             channel,
             f"{formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; check the units "

@@ -1,0 +1,38 @@
+"""A lateral speed in km/h is told as that, and not as another channel that comes early."""
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.compare import incoherent
+from sysid_vehicle.errors import SysidWarning
+from sysid_vehicle.estimate import Driving
+
+SEED = 118257
+
+
+@pytest.fixture(scope="module")
+def driven() -> dict[str, np.ndarray]:
+    truth = sv.Model(sv.example_vehicle())
+    log = sv.drive(truth, sv.manoeuvres.handling_course(lateral_mps2=6.5), seed=SEED)
+    return {name: log[name] for name in log.channels}
+
+
+@pytest.mark.parametrize("gyro", [1.0, 1.03])
+def test_a_lateral_speed_in_kmh_is_told(driven: dict[str, np.ndarray], gyro: float) -> None:
+    wrong = driven | {
+        "vy_mps": 3.6 * driven["vy_mps"],
+        "yaw_rate_radps": gyro * driven["yaw_rate_radps"],
+    }
+    with pytest.warns(SysidWarning, match=r"vy_mps: changes 3\.[4-8]\d? times .*km/h") as told:
+        log = sv.Log.from_arrays(wrong, name="kmh")
+    assert len(told) == 1
+    model = sv.Model(sv.example_vehicle())
+    assert list(incoherent(Driving.of(log), model)) == ["vy_mps"]
+
+
+@pytest.mark.parametrize("late", ["ay_mps2", "yaw_rate_radps"])
+def test_what_is_late_is_told_as_late(driven: dict[str, np.ndarray], late: str) -> None:
+    shifted = {n: v[:-10] if n == late else v[10:] for n, v in driven.items()}
+    with pytest.warns(SysidWarning, match=rf"{late}: lags behind .* by 0\.(1|09\d|10\d) s"):
+        sv.Log.from_arrays(shifted, name="late")
