@@ -1,13 +1,15 @@
 """Logs of CAN frames, written by python-can, with the database of the car."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from log_formats import DBC, FAST, MAP, SLOW, check_values, measured, read_told
 
 from sysid_vehicle import example_vehicle
-from sysid_vehicle.cli import main
+from sysid_vehicle.cli import lab_logs, main
 from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.lab import TyreLog
 from sysid_vehicle.read import read_log
 
 pytestmark = pytest.mark.filterwarnings(
@@ -74,7 +76,13 @@ class TestCan:
             read_log(path, MAP, dbc=other)
 
 
-def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_on_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fitted(_: object, logs: Sequence[TyreLog], **__: object) -> None:
+        raise InvalidInput(f"fitted: {sum(len(log.inputs) * log.step_s for log in logs):.1f} s")
+
+    monkeypatch.setattr(lab_logs, "identify_tyres", fitted)
     path, dbc = TestCan().write(tmp_path, "blf")
     (tmp_path / "map.toml").write_text(
         "[channels]\n" + "".join(f'{c} = "{s}"\n' for c, s in MAP.items())
@@ -85,7 +93,7 @@ def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     for command, said in (
         (["compare"], (2, "run: 4.0 s usable in 1 stretch(es): at least 5 s are needed")),
         (["check"], (0, "run: 2 sensor faults were found")),  # as no car drove it
-        (["lab", "identify", "--fast"], (0, "Tyres from run: 4.0 s at 100 Hz, 20 to 23 m/s")),
+        (["lab", "identify"], (2, "fitted: 4.0 s")),
     ):
         assert main([*command, str(path), *known, "--dbc", str(dbc)]) == said[0]
         assert said[1] in "".join(capsys.readouterr())
