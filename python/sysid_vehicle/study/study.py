@@ -205,7 +205,8 @@ class Study:
         """
         if len(self.fits) == 1:
             return self.where
-        return where(self.fits[0], causes=False, name=self.name_of(self.fits[0]))
+        first, left = self.fits[0], self.diagnoses[0].omnibus
+        return where(first, causes=False, name=self.name_of(first), omnibus=left)
 
     @cached_property
     def errors_with(self) -> tuple[dict[str, tuple[float, float]], ...]:

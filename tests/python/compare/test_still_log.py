@@ -11,12 +11,8 @@ from sysid_vehicle.cli.main import main
 DRAG_N = 213.444  # that the deviation of such equal numbers is above zero made it fail
 
 
-@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
-def test_compare_takes_a_log_in_which_nothing_happens(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    n, rng = 1000, np.random.default_rng(660191)
-    log = {
+def still(n: int, rng: np.random.Generator, force_n: float) -> dict[str, np.ndarray]:
+    return {
         "time_s": np.arange(n) / 100.0,
         "vx_mps": 22.0 + 0.03 * rng.standard_normal(n),
         "vy_mps": 0.03 * rng.standard_normal(n),
@@ -24,8 +20,27 @@ def test_compare_takes_a_log_in_which_nothing_happens(
         "ax_mps2": 0.06 * rng.standard_normal(n),
         "ay_mps2": 0.06 * rng.standard_normal(n),
         "steer_rad": np.zeros(n),
-        "fx_n": np.full(n, DRAG_N),
+        "fx_n": np.full(n, force_n),
     }
+
+
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
+def test_slip_angles_that_are_noise_say_nothing_of_forces() -> None:
+    """Both are smoothed from the same readings: 12 to 40 % of the one is the other."""
+    log = sv.Log.from_arrays(still(3000, np.random.default_rng(12), 0.0), name="still")
+    fit = sv.identify(sv.Model(sv.example_vehicle()), log, starts=1)
+    failing = sv.where(fit)
+    assert failing.left is not None
+    assert failing.left.rejects  # a steady force along the car
+    assert "slip angle" not in str(failing)
+    assert "a steady F_x is missing" in str(failing)
+
+
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
+def test_compare_takes_a_log_in_which_nothing_happens(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = still(1000, np.random.default_rng(660191), DRAG_N)
     assert np.std(log["fx_n"]) > 0.0
     sv.Log.from_arrays(log, name="still").to_csv(tmp_path / "still.csv")
     sv.example_vehicle().to_toml(tmp_path / "car.toml")

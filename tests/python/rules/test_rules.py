@@ -91,7 +91,7 @@ NUMERICAL = {
         "_NOTABLE", "_TINY_RAD",
     },
     "diagnose/unexplained/force_map.py": {
-        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S",
+        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S", "_MOVED",
     },
     "diagnose/experiment/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
     "diagnose/experiment/limits.py": {  # what is proposed to a driver

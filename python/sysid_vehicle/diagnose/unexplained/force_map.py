@@ -29,10 +29,11 @@ from ..evidence.evidence import FORCES
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_SLIPS = ("slip_front_rad", "slip_rear_rad")
 PAIRS = (
     ("vx_mps", "ay_mps2"),
     ("ax_mps2", "ay_mps2"),
-    ("slip_front_rad", "slip_rear_rad"),
+    _SLIPS,
     ("vx_mps", "ax_mps2"),
     ("time_s",),
 )
@@ -41,6 +42,7 @@ _CELLS_ALONE = 24
 _FEWEST = 20  # samples that make a cell worth showing
 _FOLDS = 5
 _LONGEST_S = 5.0  # of the autocorrelation
+_MOVED = 3.0  # times what the smoother could miss: less of a slip angle is the noise of the force
 UNITS = {"F_x": "N", "F_y": "N", "M_z": "N m"}
 
 
@@ -167,14 +169,15 @@ class MissingForces:
         `F_x`, `F_y`, `M_z`; without `F_x` where the wheel force is not known.
     force, std : array, shape (samples, targets)
         [N, N m], and what the smoother could miss.
-    state : array, shape (samples, n)
-        The smoothed states.
+    state, state_std : array, shape (samples, n)
+        The smoothed states, and what the smoother could miss of them.
     """
 
     targets: tuple[str, ...]
     force: FloatArray
     std: FloatArray
     state: FloatArray
+    state_std: FloatArray
 
 
 # Maps, ceilings and the structure of what is missing ask for the same forces.
@@ -197,7 +200,7 @@ def missing_forces(fit: Fit, driving: Driving) -> MissingForces:
     targets = tuple(t for t in FORCES if t != "F_x" or driving.force_known)
     columns = [3 + FORCES[t] for t in targets]
     state, std = trace["state"], trace["state_std"]
-    return MissingForces(targets, state[:, columns], std[:, columns], state)
+    return MissingForces(targets, state[:, columns], std[:, columns], state, std)
 
 
 # What fails and of which shape it is are two questions about the same maps.
@@ -205,20 +208,34 @@ def missing_forces(fit: Fit, driving: Driving) -> MissingForces:
 def force_maps(
     fit: Fit, driving: Driving
 ) -> tuple[tuple[ForceMap, ...], dict[str, tuple[float, float]]]:
-    """Maps over every pair of coordinates, and over time, the most telling first.
+    """Maps over pairs of coordinates that moved, and over time, the most telling first.
 
     With them the mean of each force over all the driving, and its standard error.
     """
     found = missing_forces(fit, driving)
     targets, force, deviation = found.targets, found.force, found.std
     where = coordinates(fit, driving, found.state)
-    maps = [_map(driving, names, where, targets, force, deviation) for names in PAIRS]
+    pairs = [names for names in PAIRS if names != _SLIPS or _slipped(fit, found, where)]
+    maps = [_map(driving, names, where, targets, force, deviation) for names in pairs]
     everywhere = np.zeros(driving.samples, dtype=np.intp), np.array([float(driving.samples)])
     steady = {}
     for i, target in enumerate(targets):
         mean, std, _ = _means(driving, *everywhere, force[:, i])
         steady[target] = float(mean[0]), float(std[0])
     return tuple(sorted(maps, key=lambda m: -m.share)), steady
+
+
+def _slipped(fit: Fit, found: MissingForces, where: dict[str, FloatArray]) -> bool:
+    """Whether the slip angles moved beyond what the smoother could miss of them.
+
+    They come from the same readings as the forces: within that they follow one noise.
+    """
+    car = fit.model.vehicle
+    vx, (vy_std, yaw_std) = found.state[:, 0], found.state_std[:, 1:3].T
+    return all(
+        np.std(where[name]) > _MOVED * np.sqrt(np.mean((vy_std**2 + (arm * yaw_std) ** 2) / vx**2))
+        for name, arm in zip(_SLIPS, (car.lf_m, car.lr_m), strict=True)
+    )
 
 
 def _map(

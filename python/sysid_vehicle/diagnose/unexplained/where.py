@@ -17,7 +17,7 @@ from ..evidence.evidence import Evidence, evident
 from .change_points import ChangePoint, change_points
 from .coherence import Coherence, coherence
 from .force_map import UNITS, ForceMap, force_maps
-from .omnibus import Omnibus
+from .omnibus import Omnibus, omnibus_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,6 +43,9 @@ class Where:
         With the steering angle and the wheel force.
     model : str
         What fails, in words.
+    left : Omnibus or None
+        Whether anything is left at all. Where nothing is no map is worth a look: what the smoother
+        takes for a force follows the noise of the readings, as slip angles do.
     """
 
     maps: tuple[ForceMap, ...]
@@ -51,6 +54,7 @@ class Where:
     alpha: float
     coherence: tuple[Coherence, ...]
     model: str = "the model"
+    left: Omnibus | None = None
 
     @property
     def title(self) -> str:
@@ -71,7 +75,9 @@ class Where:
     def lines(self) -> tuple[str, ...]:
         """The findings, a sentence each."""
         best = self.best_pair
-        if best.share > _TELLS:
+        if self.left is not None and not self.left.rejects:
+            told = [str(self.left)]
+        elif best.share > _TELLS:
             share = f"{100 * best.share:.0f} % of the missing force depends on {best.title}"
             told = [f"{share}, mostly {best.strongest}; {best.peak(best.strongest)}"]
         else:
@@ -185,6 +191,7 @@ def where(
     with Workers() as pool:
         mapped = pool.submit(force_maps, fit, driving)
         changes = pool.submit(change_points, evidence, alpha=alpha, seed=seed) if causes else None
+        omnibus = omnibus or omnibus_of(evidence)
         coherent = coherence(evidence, delays=causes, seed=seed, omnibus=omnibus)
         maps, steady = mapped.result()
     return Where(
@@ -194,4 +201,5 @@ def where(
         alpha,
         coherent,
         name,
+        omnibus,
     )

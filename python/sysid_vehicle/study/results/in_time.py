@@ -41,7 +41,8 @@ def _nothing(study: Study) -> Shares:
 
 def _without_causes(study: Study) -> Any:
     """Maps and coherence alone, which take a pass or two."""
-    return where(study.fit, causes=False, name=study.name_of(study.fit))
+    name = study.name_of(study.fit)
+    return where(study.fit, causes=False, name=name, omnibus=study.omnibus)
 
 
 _PARTS = {
