@@ -15,8 +15,8 @@ _BEGIN_MPS2 = 0.05  # change of gravity along or across within a second
 # take one for a plane are too narrow.
 _LEAST_MPS2 = 0.003
 _LONGEST = math.log(4.0)  # step of the logarithm of the standard deviation
-_FASTER = 8.0  # than the fixed point alone: secants of close points are rough
 _AT_REST = 0.02  # the same, of a step that no fault feels
+_FASTER = 8.0  # than the fixed point alone: secants of close points are rough
 
 
 class Unevenness:
