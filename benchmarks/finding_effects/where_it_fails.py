@@ -93,7 +93,7 @@ def study(name: str, truth: sv.Model, seed: int, count: Counter[str]) -> None:
         count["a residual follows an input"] += any(
             c.peak[2] > c.threshold for c in failing.coherence
         )
-        count["a map predicts more than 2 %"] += failing.best_pair.share > 0.02
+        count["a map predicts more than 2 %"] += failing.best_map.share > 0.02
     if name == "grip":
         return
     shape = sv.unknown(fit, test)

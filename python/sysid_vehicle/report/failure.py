@@ -25,7 +25,12 @@ def where_and_when(study: Study, samples: Samples | None, truth: Model | None) -
     for title, lines in study.where_lines:
         parts += [heading(title, 3), bullets(f"{line[0].upper()}{line[1:]}." for line in lines)]
     whose = "the final model" if study.added else "the baseline"
-    grid, told = _map(baseline.best_pair)
+    best = baseline.best_map or baseline.over_time
+    if len(best.coordinates) == 2:
+        grid, told = _map(best)
+        read = "grey: hardly any driving; dots: beyond two standard errors"
+    else:
+        grid, told, read = over_one(best), "", "with 95 % intervals"
     follows = baseline.coherence[0]
     channels = list(follows.coherence)
     key = legend([*((f"c{i}", c) for i, c in enumerate(channels)), ("chance", "by chance, 95 %")])
@@ -33,10 +38,9 @@ def where_and_when(study: Study, samples: Samples | None, truth: Model | None) -
         *parts,
         figure(
             [grid, _coherence(follows)],
-            "Of the baseline: the force that it lacks, over the pair of coordinates that "
-            "predicts most of it on other pieces of the driving (grey: hardly any driving; dots: "
-            "beyond two standard errors), and how far its residuals follow the "
-            f"{INPUTS[follows.input]}, by frequency.",
+            f"Of the baseline: the force that it lacks, over {best.title}, of all that moved what "
+            f"predicts most of it on other pieces of the driving ({read}), and how far its "
+            f"residuals follow the {INPUTS[follows.input]}, by frequency.",
             told + key,
             "row",
         ),
@@ -84,22 +88,28 @@ def _grid(
 
 
 def _over_time(found: Where) -> Chart:
-    over = found.over_time
-    target = over.strongest
-    i = over.targets.index(target)
-    coordinate, edges = COORDINATES["time_s"], over.edges[0]
-    middle = coordinate.scale * 0.5 * (edges[1:] + edges[:-1])
-    force, half = over.force[i], HALF_95 * over.std[i]
+    chart = over_one(found.over_time)
+    for c in found.change_points or ():
+        chart.moment(c.driven_s, c.what)
+    return chart
+
+
+def over_one(found: ForceMap) -> Chart:
+    """The map of the strongest force over one coordinate, with 95 % intervals."""
+    target = found.strongest
+    i = found.targets.index(target)
+    coordinate = COORDINATES[found.coordinates[0]]
+    edges = coordinate.scale * found.edges[0]
+    force, half = found.force[i], HALF_95 * found.std[i]
     known = [float(v) for v in (*(force - half), *(force + half)) if np.isfinite(v)]
+    first = 0.0 if found.coordinates == ("time_s",) else float(edges[0])
     chart = Chart(
-        *_SIZE, (0.0, coordinate.scale * float(edges[-1])),
+        *_SIZE, (first, float(edges[-1])),
         (min([*known, 0.0]), max([*known, 0.0])), xlabel=coordinate.axis,
         ylabel=f"missing {target} [{UNITS[target]}]", left=60,
     )  # fmt: skip
     chart.level(0.0)
-    chart.bars(middle, force, half)
-    for c in found.change_points or ():
-        chart.moment(c.driven_s, c.what)
+    chart.bars(0.5 * (edges[1:] + edges[:-1]), force, half)
     return chart
 
 
@@ -181,10 +191,13 @@ def unknown(study: Study, samples: Samples | None, truth: Model | None) -> list[
     found = study.unknown
     if found is None:
         return []
-    grid, told = _surface(found.surface)
+    charts, told = [_curve(c) for c in found.curves[:2]], ""
+    if found.surface is not None:
+        grid, told = _surface(found.surface)
+        charts.append(grid)
     parts = [
         figure(
-            [*map(_curve, found.curves[:2]), grid],
+            charts,
             "The missing force beyond all that the fitted parameters can do, over the coordinates "
             "that predict most of it. A band holds its whole curve with 95 %. On the map dots mark "
             "where the band excludes zero; grey: hardly any driving.",

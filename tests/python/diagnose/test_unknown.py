@@ -107,8 +107,8 @@ def test_a_formula_carries_functions_of_arrays(wind: Unknown) -> None:
 def test_that_the_speed_changes_is_no_change_of_the_car(windy: Fit) -> None:
     failing = where(windy)
     assert failing.change_points == ()
-    assert failing.best_pair.coordinates[0] == "vx_mps"
-    assert failing.best_pair.share > 0.2
+    assert failing.best_map.coordinates[0] == "vx_mps"
+    assert failing.best_map.share > 0.2
 
 
 def test_nothing_is_made_of_noise(complete: Unknown) -> None:

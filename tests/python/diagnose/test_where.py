@@ -42,12 +42,12 @@ def wet(truth: Model, start: Model) -> Where:
 
 def test_a_complete_model_fails_nowhere(null: tuple[Where, ...]) -> None:
     assert [w.change_points for w in null] == [(), ()]
-    assert max(w.best_pair.share for w in null) < 0.02
+    assert max(w.best_map.share for w in null) < 0.02
     for w in null:
         assert not any(c.delay is not None and c.delay.significant for c in w.coherence)
         assert all(c.peak[2] < c.threshold for c in w.coherence)
         assert "no remaining error that depends on the driving" in str(w)
-        assert "no pair of coordinates" in str(replace(w, left=None))
+        assert "no coordinate of the motion" in str(replace(w, left=None))
 
 
 def test_the_errors_of_the_maps_are_those_of_a_complete_model(null: tuple[Where, ...]) -> None:
@@ -221,12 +221,12 @@ def test_it_is_drawn_and_written(wet: Where, delayed: Where) -> None:
     assert delayed.coherence[0].plot_phase().get_xlabel() == "frequency [Hz]"
     told = json.loads(json.dumps(wet.to_dict()))
     assert told["change_points"][0]["what"] == "grip"
-    assert told["best_pair"]["coordinates"] == list(wet.best_pair.coordinates)
+    assert told["best_pair"]["coordinates"] == list(wet.best_map.coordinates)
     assert set(told["delays"]) == {"steer", "force"}
     assert wet._repr_html_().count("<li>") == len(wet.lines)
 
 
 def test_nobody_drove_there(wet: Where) -> None:
-    best = wet.best_pair
+    best = wet.best_map
     assert np.isnan(best.force).any()
     assert np.array_equal(np.isnan(best.force[0]), best.samples < 20)

@@ -115,7 +115,7 @@ def test_an_effect_is_found_in_logs_of_several_rates(
     final = where(study.fit)
     assert final.change_points == ()
     assert not any(c.delay is not None and c.delay.significant for c in final.coherence)
-    assert final.best_pair.share < 0.05
+    assert final.best_map.share < 0.05
 
 
 @pytest.mark.filterwarnings("ignore:.*no values at:sysid_vehicle.SysidWarning")

@@ -37,7 +37,7 @@ NUMERICAL = {
     "diagnose/change/search.py": {"_CLOSE", "_ROUNDS", "_TRIED"},
     "diagnose/change/together.py": {"_FAR", "_SHARES"},
     "diagnose/candidates/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
-    "diagnose/evidence/coordinates.py": {"BLOCK_S"},
+    "diagnose/evidence/coordinates.py": {"BLOCK_S", "_MOVED"},
     "diagnose/diagnose.py": {"REFITS"},
     "diagnose/candidates/on_the_level.py": {"_MOST", "_NEAR"},  # what is refitted
     "diagnose/candidates/refitting.py": {
@@ -91,7 +91,7 @@ NUMERICAL = {
         "_NOTABLE", "_TINY_RAD",
     },
     "diagnose/unexplained/force_map.py": {
-        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S", "_MOVED",
+        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S",
     },
     "diagnose/experiment/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
     "diagnose/experiment/limits.py": {  # what is proposed to a driver

@@ -11,6 +11,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ...estimate import Driving
 from ...identify import Fit
 from ...vehicle import slip_angles
+from .evidence import FORCES
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,41 @@ def coordinates(fit: Fit, driving: Driving, state: FloatArray) -> dict[str, Floa
         "yaw_rate_radps": r,
         "time_s": running_time(driving),
     }
+
+
+_MOVED = 3.0  # times what the smoother could miss: less is the noise that the forces follow too
+
+
+def that_moved(fit: Fit, driving: Driving, state: FloatArray, std: FloatArray) -> frozenset[str]:
+    """Names of the coordinates that moved beyond what a smoother could miss of them.
+
+    Forces are smoothed from the same readings: within that both follow one noise. A constant wheel
+    force is compared with the missing one, a measured acceleration with the noise of its sensor.
+
+    Parameters
+    ----------
+    fit : Fit
+    driving : Driving
+    state, std : array, shape (samples, n)
+        Smoothed states, and their standard deviations.
+    """
+    car = fit.model.vehicle
+    v, r = state[:, 0], state[:, 2]
+    v_std, side_std, r_std = std[:, 0], std[:, 1], std[:, 2]
+    along = FORCES["F_x"] + 3
+    missed = {
+        "vx_mps": v_std,
+        "ay_mps2": np.hypot(v * r_std, r * v_std),
+        "ax_mps2": std[:, along] / car.mass_kg if driving.force_known else fit.noise.sensor[3],
+        "slip_front_rad": np.hypot(side_std, car.lf_m * r_std) / v,
+        "slip_rear_rad": np.hypot(side_std, car.lr_m * r_std) / v,
+        "yaw_rate_radps": r_std,
+        "time_s": 0.0,
+    }
+    at = coordinates(fit, driving, state)
+    return frozenset(
+        name for name, e in missed.items() if np.std(at[name]) > _MOVED * np.sqrt(np.mean(e**2))
+    )
 
 
 def running_time(driving: Driving) -> FloatArray:

@@ -23,17 +23,16 @@ from ..._common.text import HALF_95, brief, html_text
 from ...estimate import Driving
 from ...identify import Fit
 from ...vehicle import GRAVITY_MPS2
-from ..evidence.coordinates import BLOCK_S, COORDINATES, Coordinate, coordinates
+from ..evidence.coordinates import BLOCK_S, COORDINATES, Coordinate, coordinates, that_moved
 from ..evidence.evidence import FORCES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SLIPS = ("slip_front_rad", "slip_rear_rad")
 PAIRS = (
     ("vx_mps", "ay_mps2"),
     ("ax_mps2", "ay_mps2"),
-    _SLIPS,
+    ("slip_front_rad", "slip_rear_rad"),
     ("vx_mps", "ax_mps2"),
     ("time_s",),
 )
@@ -42,7 +41,6 @@ _CELLS_ALONE = 24
 _FEWEST = 20  # samples that make a cell worth showing
 _FOLDS = 5
 _LONGEST_S = 5.0  # of the autocorrelation
-_MOVED = 3.0  # times what the smoother could miss: less of a slip angle is the noise of the force
 UNITS = {"F_x": "N", "F_y": "N", "M_z": "N m"}
 
 
@@ -208,34 +206,23 @@ def missing_forces(fit: Fit, driving: Driving) -> MissingForces:
 def force_maps(
     fit: Fit, driving: Driving
 ) -> tuple[tuple[ForceMap, ...], dict[str, tuple[float, float]]]:
-    """Maps over pairs of coordinates that moved, and over time, the most telling first.
+    """Maps over pairs of coordinates, and over time, the most telling first.
 
-    With them the mean of each force over all the driving, and its standard error.
+    Of a pair of which one alone moved the map is over that one. With them the mean of each force
+    over all the driving, and its standard error.
     """
     found = missing_forces(fit, driving)
     targets, force, deviation = found.targets, found.force, found.std
     where = coordinates(fit, driving, found.state)
-    pairs = [names for names in PAIRS if names != _SLIPS or _slipped(fit, found, where)]
-    maps = [_map(driving, names, where, targets, force, deviation) for names in pairs]
+    moved = that_moved(fit, driving, found.state, found.state_std)
+    over = dict.fromkeys(tuple(n for n in pair if n in moved) for pair in PAIRS)
+    maps = [_map(driving, names, where, targets, force, deviation) for names in over if names]
     everywhere = np.zeros(driving.samples, dtype=np.intp), np.array([float(driving.samples)])
     steady = {}
     for i, target in enumerate(targets):
         mean, std, _ = _means(driving, *everywhere, force[:, i])
         steady[target] = float(mean[0]), float(std[0])
     return tuple(sorted(maps, key=lambda m: -m.share)), steady
-
-
-def _slipped(fit: Fit, found: MissingForces, where: dict[str, FloatArray]) -> bool:
-    """Whether the slip angles moved beyond what the smoother could miss of them.
-
-    They come from the same readings as the forces: within that they follow one noise.
-    """
-    car = fit.model.vehicle
-    vx, (vy_std, yaw_std) = found.state[:, 0], found.state_std[:, 1:3].T
-    return all(
-        np.std(where[name]) > _MOVED * np.sqrt(np.mean((vy_std**2 + (arm * yaw_std) ** 2) / vx**2))
-        for name, arm in zip(_SLIPS, (car.lf_m, car.lr_m), strict=True)
-    )
 
 
 def _map(

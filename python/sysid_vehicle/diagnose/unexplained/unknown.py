@@ -32,14 +32,15 @@ class Unknown:
     ----------
     curves : tuple of Curve
         F_x, F_y, M_z, each over the coordinate that tells most of it; the best supported first.
-    surface : Surface
-        The best supported force over the pair of coordinates that predicts most.
+    surface : Surface or None
+        The best supported force over the pair of coordinates that predicts most; None where no
+        pair moved.
     proposals : tuple of Proposal
         At most three, which act together; `proposal.as_effect(id)` makes an effect of one.
     """
 
     curves: tuple[Curve, ...]
-    surface: Surface
+    surface: Surface | None
     proposals: tuple[Proposal, ...]
 
     @property
@@ -80,7 +81,8 @@ class Unknown:
                 }
                 for c in self.curves
             ],
-            "surface": {
+            "surface": s
+            and {
                 "target": s.target,
                 "over": [c.name for c in s.coordinates],
                 "at": [_numbers(a) for a in s.at],
@@ -119,9 +121,10 @@ def unknown(
     driving = evident(fit, logs)
     evidence = Evidence(fit, driving)
     maps, _ = force_maps(fit, driving)
-    best = next(m.coordinates for m in maps if len(m.coordinates) == 2)
+    pairs = (m.coordinates for m in maps if len(m.coordinates) == 2)
+    best = next(pairs, None)
     return Unknown(
         curves(evidence, seed),
-        surface(evidence, (best[0], best[1]), seed),
+        best and surface(evidence, (best[0], best[1]), seed),
         propose(evidence, Evidence(fit, evident(fit, test))),
     )

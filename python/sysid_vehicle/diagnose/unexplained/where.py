@@ -62,9 +62,12 @@ class Where:
         return f"Where {self.model} fails"
 
     @property
-    def best_pair(self) -> ForceMap:
-        """The map over the pair of coordinates that predicts most of the missing force."""
-        return next(m for m in self.maps if len(m.coordinates) == 2)
+    def best_map(self) -> ForceMap | None:
+        """The map over the motion that predicts most of the missing force.
+
+        None where nothing moved by more than the smoother could miss of it.
+        """
+        return next((m for m in self.maps if m.coordinates != ("time_s",)), None)
 
     @property
     def over_time(self) -> ForceMap:
@@ -74,14 +77,16 @@ class Where:
     @property
     def lines(self) -> tuple[str, ...]:
         """The findings, a sentence each."""
-        best = self.best_pair
+        best = self.best_map
         if self.left is not None and not self.left.rejects:
             told = [str(self.left)]
+        elif best is None:
+            told = ["nothing moved by more than the smoother could miss of it"]
         elif best.share > _TELLS:
             share = f"{100 * best.share:.0f} % of the missing force depends on {best.title}"
             told = [f"{share}, mostly {best.strongest}; {best.peak(best.strongest)}"]
         else:
-            told = ["no pair of coordinates predicts a missing force"]
+            told = ["no coordinate of the motion predicts a missing force"]
         told += [
             f"a steady {target} is missing: {mean:+.3g} +- {std:.2g} {UNITS[target]}"
             for target, (mean, std) in self.steady.items()
@@ -101,8 +106,8 @@ class Where:
         return f"<p>{escape(self.title)}</p><ul>{items}</ul>"
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """The missing force over the most telling pair of coordinates."""
-        return self.best_pair.plot(ax)
+        """The missing force over the most telling coordinates; over time where nothing moved."""
+        return (self.best_map or self.over_time).plot(ax)
 
     def plot_time(self, ax: Axes | None = None) -> Axes:
         """The missing force over time, and the moments at which the car changed."""
@@ -122,9 +127,10 @@ class Where:
 
     def to_dict(self) -> dict[str, Any]:
         """The findings, ready for JSON; what was not sought is left out."""
-        best = self.best_pair
-        described = {
-            "best_pair": {
+        best = self.best_map
+        described: dict[str, Any] = {
+            "best_pair": best
+            and {  # the key of the first version
                 "coordinates": list(best.coordinates),
                 "share": best.share,
                 "shares": best.shares,
