@@ -105,17 +105,17 @@ Array evaluate(const SingleTrack& model, const Array& p, const Array& motion, do
 }
 
 /// As Python hands a formula over: what is added to, and steps (operation, operands, constant).
-using Step = std::tuple<int, std::array<std::size_t, 3>, double>;
-using Steps = std::vector<Step>;
-using Act = std::pair<int, Steps>;
+using FormulaStep = std::tuple<int, std::array<std::size_t, 3>, double>;
+using FormulaSteps = std::vector<FormulaStep>;
+using Act = std::pair<int, FormulaSteps>;
 /// Rate of a state, minus its derivative by the state, and where it begins if that is said.
-using OwnState = std::tuple<Steps, Steps, std::optional<Steps>>;
+using OwnState = std::tuple<FormulaSteps, FormulaSteps, std::optional<FormulaSteps>>;
 /// An effect: its place, the numbers of the channels that it reads, what it adds, its states.
 using User =
     std::tuple<std::size_t, std::vector<std::size_t>, std::vector<Act>, std::vector<OwnState>>;
 
 /// Channels and states are numbered by effect in `steps`, by model in the formula.
-Formula formula(const Steps& steps, const std::vector<std::size_t>& channels,
+Formula formula(const FormulaSteps& steps, const std::vector<std::size_t>& channels,
                 std::size_t first_state, std::size_t states) {
     std::vector<Instruction> all;
     all.reserve(steps.size());
@@ -144,7 +144,7 @@ void set_user_effects(SingleTrack& model, const std::vector<User>& given) {
         const std::size_t own = states.size();
         if (first_state + own > kUserStates)
             throw std::invalid_argument("user: there are more states than there is room for");
-        const auto read = [&, &names = channels, first = first_state](const Steps& steps) {
+        const auto read = [&, &names = channels, first = first_state](const FormulaSteps& steps) {
             return formula(steps, names, first, own);
         };
         if (slot >= kUserEffects)

@@ -99,7 +99,7 @@ def test_the_extension_runs_on_any_x86_64_processor() -> None:
     built.sort(key=lambda folder: folder.stat().st_mtime)
     if not built:
         pytest.skip("the objects of the library are not here: it was built elsewhere")
-    objects = [*built[-1].rglob("*.cpp.o"), *built[-1].with_name("_core.dir").rglob("*.cpp.o")]
+    objects = [*built[-1].rglob("*.o"), *built[-1].with_name("_core.dir").rglob("*.o")]
     chosen = [path for path in objects if path.name.startswith("lanes_avx")]
     assert len(chosen) == 2
     others = [path for path in objects if path not in chosen]
