@@ -22,84 +22,76 @@ double share_of(double dt, double time_s) { return std::exp(-dt / time_s); }
 
 }  // namespace
 
-template <class S>
-void TyreModel::forces(const Input& u, const S* x, S& front, S& rear) const {
-    using std::exp;
-    front = axle_force<S>(x[kSlipF], u.loads.fz_f, u.loads.fx_f, car.front, exp(x[kStiffF]),
-                          exp(x[kGripF])) +
+void TyreModel::forces(const Input& u, const double* x, Forces& asked, double& front,
+                       double& rear) const {
+    front = asked.front(x[kSlipF], u.loads.fz_f, u.loads.fx_f, car.front, x[kStiffF], x[kGripF]) +
             u.error_f_n * x[kErrorF];
-    rear = axle_force<S>(x[kSlipR], u.loads.fz_r, u.loads.fx_r, car.rear, exp(x[kStiffR]),
-                         exp(x[kGripR])) +
+    rear = asked.rear(x[kSlipR], u.loads.fz_r, u.loads.fx_r, car.rear, x[kStiffR], x[kGripR]) +
            u.error_r_n * x[kErrorR];
 }
 
-template <class S>
-void TyreModel::predict(const Input& u, const S* x, S* next) const {
-    using std::cos;
-    using std::exp;
-    using std::sin;
+void TyreModel::predict(const Input& u, const double* x, double* next) const {
     const VehicleData& c = car.data;
     const double vx = 0.5 * (u.vx + u.vx_before), ax = 0.5 * (u.ax + u.ax_before);
     const double steer = 0.5 * (u.steer + u.steer_before);
     // Late wheels stand where the angle was; what is taken off is linear in the time.
     const double gone = steer - 0.5 * (u.steer_slow + u.steer_slow_before);
-    const S turned = steer + x[kSteerOff] - (gone / kSteerLagS) * x[kLate];
+    const double turned = steer + x[kSteerOff] - (gone / kSteerLagS) * x[kLate];
     const double cosine = std::cos(steer), side = u.loads.fx_f * std::sin(steer);
-    const S inverse_inertia = exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2;
-    S felt;
-    const auto rates = [&](const S* at, S& beta_rate, S& yaw_acceleration) {
-        S front, rear;
-        forces(u, at, front, rear);
-        const S front_across = cosine * front + side;
+    const double inverse_inertia = std::exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2;
+    double felt = 0.0;
+    const auto rates = [&](const double* at, Forces& asked, double& beta_rate,
+                           double& yaw_acceleration) {
+        double front = 0.0, rear = 0.0;
+        forces(u, at, asked, front, rear);
+        const double front_across = cosine * front + side;
         felt = (front_across + rear) / c.mass_kg + at[kPush];
-        const S ay = felt + at[kRoad];
-        const S along = cos(at[kBeta]);
-        beta_rate = (ay * along - ax * sin(at[kBeta])) * along / vx - at[kYawRate];
+        const double ay = felt + at[kRoad];
+        const double along = std::cos(at[kBeta]);
+        beta_rate = (ay * along - ax * std::sin(at[kBeta])) * along / vx - at[kYawRate];
         yaw_acceleration =
             (c.lf_m * front_across - c.lr_m * rear + u.drive_nm * at[kDrive]) * inverse_inertia +
             at[kTurn];
     };
-    const S keep = exp((-vx * u.dt / settings.relaxation_m) * exp(-1.0 * x[kRelax]));
-    const auto relax = [&](const S& beta, const S& r, S* to) {
-        const S tangent = sin(beta) / cos(beta);
-        const Axles<S> slip =
-            slip_angles(S(1.0), tangent, S((1.0 / vx) * r), c.lf_m, c.lr_m, turned);
+    const double keep = std::exp((-vx * u.dt / settings.relaxation_m) * std::exp(-1.0 * x[kRelax]));
+    const auto relax = [&](double beta, double r, double* to) {
+        const double tangent = std::sin(beta) / std::cos(beta);
+        const Axles<double> slip =
+            slip_angles(1.0, tangent, (1.0 / vx) * r, c.lf_m, c.lr_m, turned);
         to[kSlipF] = slip.front + keep * (x[kSlipF] - slip.front);
         to[kSlipR] = slip.rear + keep * (x[kSlipR] - slip.rear);
     };
     for (int i = 0; i < kStates; ++i) next[i] = x[i];
-    next[kGripF] = x[kGripF] * share_of(u.dt, settings.friction_time_s);
-    next[kGripR] = x[kGripR] * share_of(u.dt, settings.friction_time_s);
-    next[kRoad] = x[kRoad] * share_of(u.dt, settings.road_time_s);
-    next[kPush] = x[kPush] * share_of(u.dt, settings.push_time_s);
-    next[kTurn] = x[kTurn] * share_of(u.dt, settings.push_time_s);
-    next[kErrorF] = x[kErrorF] * share_of(u.dt, settings.error_time_s);
-    next[kErrorR] = x[kErrorR] * share_of(u.dt, settings.error_time_s);
-    next[kDrive] = x[kDrive] * share_of(u.dt, settings.error_time_s);
+    next[kGripF] = x[kGripF] * u.keeps.friction;
+    next[kGripR] = x[kGripR] * u.keeps.friction;
+    next[kRoad] = x[kRoad] * u.keeps.road;
+    next[kPush] = x[kPush] * u.keeps.push;
+    next[kTurn] = x[kTurn] * u.keeps.push;
+    next[kErrorF] = x[kErrorF] * u.keeps.error;
+    next[kErrorR] = x[kErrorR] * u.keeps.error;
+    next[kDrive] = x[kDrive] * u.keeps.error;
     // Heun's rule: at low speed the tyres answer within a few samples.
-    S first_beta, first_yaw, second_beta, second_yaw;
-    rates(x, first_beta, first_yaw);
+    double first_beta = 0.0, first_yaw = 0.0, second_beta = 0.0, second_yaw = 0.0;
+    rates(x, before, first_beta, first_yaw);
     next[kBeta] = x[kBeta] + u.dt * first_beta;
     next[kYawRate] = x[kYawRate] + u.dt * first_yaw;
     relax(0.5 * (x[kBeta] + next[kBeta]), 0.5 * (x[kYawRate] + next[kYawRate]), next);
-    rates(next, second_beta, second_yaw);
+    rates(next, after, second_beta, second_yaw);
     next[kBeta] = x[kBeta] + 0.5 * u.dt * (first_beta + second_beta);
     next[kYawRate] = x[kYawRate] + 0.5 * u.dt * (first_yaw + second_yaw);
     relax(0.5 * (x[kBeta] + next[kBeta]), 0.5 * (x[kYawRate] + next[kYawRate]), next);
-    next[kLean] = felt + share_of(u.dt, settings.roll_time_s) * (x[kLean] - felt);
+    next[kLean] = felt + u.keeps.roll * (x[kLean] - felt);
 }
 
-template <class S>
-void TyreModel::observe(const Input& u, const S* x, S* y) const {
-    using std::exp;
-    S front, rear;
-    forces(u, x, front, rear);
+void TyreModel::observe(const Input& u, const double* x, double* y) const {
+    double front = 0.0, rear = 0.0;
+    forces(u, x, read, front, rear);
     y[0] = x[kYawRate] + x[kGyroBias];
     const VehicleData& c = car.data;
-    const S across = std::cos(u.steer) * front + std::sin(u.steer) * u.loads.fx_f;
-    const S turn = (c.lf_m * across - c.lr_m * rear + u.drive_nm * x[kDrive]) *
-                       exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2 +
-                   x[kTurn];
+    const double across = std::cos(u.steer) * front + std::sin(u.steer) * u.loads.fx_f;
+    const double turn = (c.lf_m * across - c.lr_m * rear + u.drive_nm * x[kDrive]) *
+                            std::exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2 +
+                        x[kTurn];
     y[1] = (across + rear) / c.mass_kg + x[kPush] + x[kAhead] * turn + x[kRoll] * x[kLean] +
            x[kAyBias];
 }
@@ -201,13 +193,17 @@ void TyreObserver::adopt(const TyreObserver& other) {
 }
 
 void TyreObserver::forces(double& front, double& rear) const {
-    const TyreModel model{car_, settings_};
-    model.forces(input_, filter_.state().mean.data(), front, rear);
+    const TyreModel& model = filter_.model();
+    model.forces(input_, filter_.state().mean.data(), model.read, front, rear);
 }
 
 void TyreObserver::step(const TyreModel::Input& common, const SensorSample& s) {
     TyreModel::Input& u = input_;
     u = common;
+    const auto left_after = [&](double time_s) { return share_of(u.dt, time_s); };
+    u.keeps = {left_after(settings_.friction_time_s), left_after(settings_.road_time_s),
+               left_after(settings_.push_time_s), left_after(settings_.error_time_s),
+               left_after(settings_.roll_time_s)};
     double front = 0.0, rear = 0.0;
     forces(front, rear);
     const auto error = [&](double fz, double fx, double force, double mu) {

@@ -152,5 +152,27 @@ TEST(CorneringRls, RefusesWhatCannotBe) {
     EXPECT_EQ(rls.used(), 1U);
 }
 
+TEST(AxleForceAgain, IsTheForceWhateverWasAskedBefore) {
+    const TyreCoefficients<double> tyre{10.0, 1.4, 1.05, -0.5};
+    AxleForceAgain again;
+    std::array<double, 5> now{0.05, 4000.0, 500.0, 0.1, -0.05};
+    const std::array<double, 5> step{0.01, 300.0, -200.0, 0.07, 0.04};
+    for (int round = 0; round < 60; ++round) {
+        const double asked = again(now[0], now[1], now[2], tyre, now[3], now[4]);
+        EXPECT_EQ(asked, axle_force<double>(now[0], now[1], now[2], tyre, std::exp(now[3]),
+                                            std::exp(now[4])));
+        // One after the other, twice the same between: what has not changed is not worked out.
+        const auto next = static_cast<std::size_t>(round / 2 % 5);
+        if (round % 2 == 1) now[next] += step[next];
+    }
+}
+
+TEST(AxleForceAgain, KnowsNothingAtFirst) {
+    AxleForceAgain again;
+    const TyreCoefficients<double> tyre{10.0, 1.4, 1.05, -0.5};
+    EXPECT_EQ(again(0.0, 0.5, 0.0, tyre, 0.0, 0.0), 0.0);
+    EXPECT_GT(again(0.02, 0.5, 0.0, tyre, 0.0, 0.0), 0.0);
+}
+
 }  // namespace
 }  // namespace sysid

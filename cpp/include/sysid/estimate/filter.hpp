@@ -71,6 +71,7 @@ class Filter {
         state_.mean = mean;
         state_.covariance = covariance;
         root_ = factor_of<NX>(covariance, index_);
+        factored_ = true;
     }
 
     void set_gate(const Gate<NY>& gate) { gate_ = gate; }
@@ -84,15 +85,25 @@ class Filter {
     double nis() const { return nis_; }
     Vec<NY> noise_scale() const { return scale_; }
     Model& model() { return model_; }
+    const Model& model() const { return model_; }
 
     /// What the next step depends on, for `StateWriter` and `StateReader`; the model and the
     /// weights are those of the constructor.
     template <class Row>
     void remember(Row& row) {
         row(gate_, state_.mean, state_.covariance, root_, scale_, index_);
+        factored_ = false;  // unknown of what was read
     }
 
   private:
+    /// The unscented filter keeps a covariance; its factor is known where it has just begun again.
+    void factorise() {
+        if constexpr (method == Method::kUnscented) {
+            if (!factored_) root_ = factor_of<NX>(state_.covariance, index_);
+            factored_ = false;  // what follows changes the covariance
+        }
+    }
+
     void predict(const Input& input) {
         const auto f = [&](const Vec<NX>& x) {
             Vec<NX> next;
@@ -109,8 +120,7 @@ class Filter {
             propagate<NX>(state_.transition, state_.covariance);
             state_.covariance += Q;
         } else {
-            if constexpr (method == Method::kUnscented)
-                root_ = factor_of<NX>(state_.covariance, index_);
+            factorise();
             const auto t = transform<NX, NX>(f, state_.mean, root_, weights_);
             // The regression of the new on the old state: what a smoother takes for the transition.
             state_.transition = t.slope_times_L;
@@ -145,8 +155,7 @@ class Filter {
             line.noise = R;
             refusals_ = gate_.apply(y, line.expected, line.innovation_variance(state_.covariance));
         } else {
-            if constexpr (method == Method::kUnscented)
-                root_ = factor_of<NX>(state_.covariance, index_);
+            factorise();
             const auto t = transform<NY, NX>(h, state_.mean, root_, weights_);
             line = Regression<NX, NY>::of(t, root_, R, weights_);
             refusals_ = gate_.apply(y, line.expected, line.innovation_variance(state_.covariance));
@@ -197,6 +206,7 @@ class Filter {
     SigmaWeights weights_;
     Step state_;
     Mat<NX, NX> root_;
+    bool factored_ = true;  // whether `root_` is the factor of the covariance as it is
     Vec<NY> scale_;
     std::size_t index_ = 0;
     Vec<NY> used_ = Vec<NY>::Zero();

@@ -2,6 +2,9 @@
 // with the longitudinal force, and whose stiffness and friction can be rescaled while driving.
 #pragma once
 
+#include <array>
+#include <cmath>
+
 #include "sysid/math/dual.hpp"
 #include "sysid/model/tyre.hpp"
 #include "sysid/model/vehicle.hpp"
@@ -50,5 +53,33 @@ S axle_force(const S& alpha, double fz, double fx, const TyreCoefficients<double
     };
     return fz * grip_left(fx, fz, tyre.D * value_of(friction)) * magic_formula<S>(alpha, t);
 }
+
+/// `axle_force` of one axle, for a filter that asks at one sigma point after the other. Most of
+/// them differ from the one before in what tyres do not feel: what was asked last is not worked out
+/// again. Stiffness and friction are given by their logarithms.
+class AxleForceAgain {
+  public:
+    double operator()(double alpha, double fz, double fx, const TyreCoefficients<double>& tyre,
+                      double log_stiffness, double log_friction) {
+        const std::array<double, 4> curve{fz, fx, log_stiffness, log_friction};
+        const bool same_curve = curve == curve_;
+        if (same_curve && alpha == alpha_) return force_;
+        if (!same_curve) {
+            const double friction = std::exp(log_friction);
+            curve_ = curve;
+            most_ = fz * grip_left(fx, fz, tyre.D * friction);
+            scaled_ = {tyre.B * std::exp(log_stiffness) / friction, tyre.C, tyre.D * friction,
+                       tyre.E};
+        }
+        alpha_ = alpha;
+        force_ = most_ * magic_formula(alpha, scaled_);
+        return force_;
+    }
+
+  private:
+    std::array<double, 4> curve_{std::nan("")};  // equal to nothing
+    double alpha_ = 0.0, most_ = 0.0, force_ = 0.0;
+    TyreCoefficients<double> scaled_{};
+};
 
 }  // namespace sysid

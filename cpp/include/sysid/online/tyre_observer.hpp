@@ -48,6 +48,10 @@ struct TyreModel {  // observer B
     // What is learnt of the car and outlives a stop.
     static constexpr int kLearnt = kStiffF, kLearntStates = kRoll - kStiffF + 1;
     static constexpr int kMeasured = 2;  // r, a_y
+    /// What is left, at the next sample, of states that fade in some time.
+    struct Keeps {
+        double friction = 1.0, road = 1.0, push = 1.0, error = 1.0, roll = 1.0;
+    };
     struct Input {
         double dt = 0.0;
         double steer = 0.0, steer_before = 0.0;            // now and at the sample before
@@ -59,17 +63,22 @@ struct TyreModel {  // observer B
         double drive_nm = 0.0;                    // standard deviation of that yaw moment
         double stiffness_walk_f = 0.0, stiffness_walk_r = 0.0;  // [1/sqrt(s)]
         double slip_f_walk = 0.0;  // of an unknown steering angle [rad/sqrt(s)]
+        Keeps keeps{};
+    };
+
+    struct Forces {
+        AxleForceAgain front, rear;
     };
 
     ObservedCar car;
     ObserverSettings settings;
+    // Forces at either end of a prediction and of a reading, asked for at all sigma points in turn.
+    // Whoever steps an observer has it for himself.
+    mutable Forces before{}, after{}, read{};
 
-    template <class S>
-    void forces(const Input& u, const S* x, S& front, S& rear) const;
-    template <class S>
-    void predict(const Input& u, const S* x, S* next) const;
-    template <class S>
-    void observe(const Input& u, const S* x, S* y) const;
+    void forces(const Input& u, const double* x, Forces& asked, double& front, double& rear) const;
+    void predict(const Input& u, const double* x, double* next) const;
+    void observe(const Input& u, const double* x, double* y) const;
     Mat<kStates, kStates> process_noise(const Input& u) const;
     Mat<2, 2> measurement_noise(const Input& u) const;
 };
