@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 
 #include "arrays.hpp"
 #include "fields.hpp"
@@ -39,7 +40,8 @@ void register_simulate(py::module_& m) {
         "simulate",
         [](const SingleTrack& model, const Array& p, double dt, const Array& references,
            const Driver& driver, const Array& disturbance, double initial_speed, double initial_vy,
-           double initial_yaw_rate, double initial_steer, double start, const Array& channels) {
+           double initial_yaw_rate, double initial_steer, double start, const Array& channels,
+           double farthest_m) {
             const std::vector<Reference> wanted = references_of(references);
             const auto n = references.shape(0);
             const double* values = vector(p, kParameterCount, "parameters");
@@ -60,7 +62,7 @@ void register_simulate(py::module_& m) {
             };
             const Drive drive = unlocked([&] {
                 return simulate(model, values, dt, wanted, driver, external.data(), beginning,
-                                logged);
+                                logged, farthest_m);
             });
             return py::make_tuple(copy_of(drive.inputs, 2), copy_of(drive.states, kModelStates),
                                   copy_of(drive.outputs, kChannels), drive.lost_at);
@@ -68,7 +70,8 @@ void register_simulate(py::module_& m) {
         py::arg("model"), py::arg("parameters"), py::arg("dt"), py::arg("references"),
         py::arg("driver"), py::arg("disturbance"), py::arg("initial_speed"),
         py::arg("initial_vy") = 0.0, py::arg("initial_yaw_rate") = 0.0,
-        py::arg("initial_steer") = 0.0, py::arg("start") = 0.0, py::arg("channels") = Array());
+        py::arg("initial_steer") = 0.0, py::arg("start") = 0.0, py::arg("channels") = Array(),
+        py::arg("farthest_m") = std::numeric_limits<double>::infinity());
 }
 
 }  // namespace sysid::bindings

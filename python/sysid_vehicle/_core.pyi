@@ -298,6 +298,7 @@ def simulate(
     initial_steer: float = 0.0,
     start: float = 0.0,
     channels: _Array = ...,
+    farthest_m: float = ...,
 ) -> tuple[_Array, _Array, _Array, int]: ...
 
 # --- lab observer

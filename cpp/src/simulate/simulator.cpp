@@ -14,11 +14,28 @@ namespace {
 constexpr int kSubsteps = 4, kSubstepsWithLags = 8;
 constexpr double kLostSideslip = 0.7;  // [rad]
 
+// Where the car is, from its first sample on.
+class Place {
+  public:
+    void go(const ModelState<double>& x, double dt) {
+        heading_ += x[2] * dt;
+        const double c = std::cos(heading_), s = std::sin(heading_);
+        ahead_ += (x[0] * c - x[1] * s) * dt;
+        left_ += (x[0] * s + x[1] * c) * dt;
+    }
+
+    double away() const { return std::hypot(ahead_, left_); }
+
+  private:
+    double heading_ = 0.0, ahead_ = 0.0, left_ = 0.0;
+};
+
 }  // namespace
 
 Drive simulate(const SingleTrack& model, const double* p, double dt,
                const std::vector<Reference>& references, const Driver& driver,
-               const double* disturbance, const Beginning& beginning, const Logged& logged) {
+               const double* disturbance, const Beginning& beginning, const Logged& logged,
+               double farthest_m) {
     Drive out;
     out.lost_at = references.size();
     const VehicleData& car = model.car;
@@ -49,6 +66,8 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     settle_auxiliary(model, x, external.data(), u, p);
     const std::size_t last = references.size() - 1;
     const std::size_t delay = hands.delay(), preview = hands.preview();
+    const bool bounded = std::isfinite(farthest_m);
+    Place place;
     const int fewest = active_states(model.effects).count > 0 ? kSubstepsWithLags : kSubsteps;
     for (std::size_t k = 0; k < references.size(); ++k) {
         poll_interrupt(k);
@@ -62,7 +81,8 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
         // Written so that a state that is not a number counts as lost.
         const bool under_control =
             x[0] >= kLowestSpeed && std::abs(std::atan2(x[1], x[0])) <= kLostSideslip;
-        if (!under_control) {
+        if (bounded && k > 0) place.go(x, dt);
+        if (!under_control || place.away() > farthest_m) {
             out.lost_at = k;
             break;
         }

@@ -24,6 +24,7 @@ from .search.box import free_box, objective_of
 from .search.search import METHODS
 from .search.settle import settle
 from .search.starts import Start, Starts
+from .several_starts import refine_from
 from .suspects import explaining
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "refine",
     "refine_above",
     "refine_beside",
+    "refine_from",
     "refine_while",
     "refit",
     "relearn",

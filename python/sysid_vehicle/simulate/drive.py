@@ -95,8 +95,12 @@ def drive_truth(
     rate_hz: float = 100.0,
     name: str | None = None,
     channels: Mapping[str, Channel] | None = None,
+    farthest_m: float = np.inf,
 ) -> Drive:
-    """Drive as :func:`drive` does, and keep what no sensor sees."""
+    """Drive as :func:`drive` does, and keep what no sensor sees.
+
+    A drive that leads farther than `farthest_m` from where it began is lost too.
+    """
     expect(model, Model, "drive")
     expect(manoeuvre, Manoeuvre, "drive")
     rng = generator(seed)
@@ -113,9 +117,10 @@ def drive_truth(
         external,
         float(references[0, 0]),
         channels=_by_number(logged, n),
+        farthest_m=farthest_m,
     )
     if lost_at < n:
-        raise NumericalError(_how_it_was_lost(manoeuvre, states[-1], lost_at / rate_hz))
+        raise NumericalError(_how_it_was_lost(manoeuvre, states[-1], lost_at / rate_hz, farthest_m))
     if not np.isfinite(outputs).all():
         k = int(np.flatnonzero(~np.isfinite(outputs).all(axis=1))[0])
         raise NumericalError(
@@ -226,9 +231,13 @@ def drive(
     ).log
 
 
-def _how_it_was_lost(manoeuvre: Manoeuvre, state: FloatArray, time_s: float) -> str:
+def _how_it_was_lost(
+    manoeuvre: Manoeuvre, state: FloatArray, time_s: float, farthest_m: float
+) -> str:
     vx, vy = float(state[0]), float(state[1])
     what = "stopped" if 0.0 <= vx < _STOPPED_MPS and abs(vy) < _STOPPED_MPS else "spun"
+    if np.isfinite(farthest_m):
+        what = f"spun, stopped, or was more than {farthest_m:g} m from where it began"
     return (
         f"{manoeuvre.name}: the car {what} at t = {time_s:.6g} s (v_x {vx:.3g} m/s, v_y {vy:.3g} "
         f"m/s); ask the manoeuvre for less lateral acceleration or less speed"

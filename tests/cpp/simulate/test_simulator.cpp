@@ -1,4 +1,6 @@
 // The driver in the loop: follows, gives up when the car is lost, and repeats himself exactly.
+#include <numbers>
+
 #include "helpers.hpp"
 #include "sysid/simulate/simulator.hpp"
 
@@ -111,6 +113,24 @@ TEST(Simulator, BeginsInTheMiddleOfACorner) {
     }
     EXPECT_GT(moved, 0.1);  // the loss of grip is felt
     EXPECT_EQ(drive(2, {20.0, 0.0, 0.0, 0.01, 0.0}).inputs[0], 0.03 + 0.01);
+}
+
+TEST(Simulator, EndsWhereItIsTooFarAway) {
+    // Half a circle of 20 m radius, at 10 m/s: nowhere farther away than its width.
+    const std::vector<Reference> circle(1000, {10.0, 0.05, 0.0});
+    const std::vector<double> calm(kExternals * circle.size(), 0.0);
+    const Parameters p = typical_parameters();
+    const auto within = [&](double farthest_m) {
+        return simulate({saloon(), 0}, p.data(), kStep, circle, {}, calm.data(), {10.0}, {},
+                        farthest_m);
+    };
+    EXPECT_EQ(within(50.0).lost_at, 1000U);
+    const Drive ended = within(20.0);
+    ASSERT_LT(ended.lost_at, 1000U);
+    // The chord of a sixth of a circle is as long as its radius; it has to turn in first.
+    EXPECT_NEAR(static_cast<double>(ended.lost_at) * kStep, 20.0 * std::numbers::pi / 3.0 / 10.0,
+                0.15);
+    EXPECT_EQ(samples(ended), ended.lost_at + 1);
 }
 
 TEST(Simulator, EndsWhenSpun) {

@@ -1,8 +1,14 @@
 """Limits of proposed drives that follow from the size of a car."""
 
+from typing import Any
+
+import numpy as np
 import pytest
 
-from sysid_vehicle import DriveLimits, Model
+from sysid_vehicle import DriveLimits, Model, NumericalError
+from sysid_vehicle.diagnose.experiment.limits import menu
+from sysid_vehicle.manoeuvres import Manoeuvre
+from sysid_vehicle.simulate import SensorNoise, drive_truth
 
 
 def test_a_lorry_is_no_faster_than_a_car(start: Model) -> None:
@@ -20,3 +26,33 @@ def test_a_high_vehicle_is_not_tipped_over(start: Model) -> None:
     assert DriveLimits.usual(lorry).lateral_mps2 == pytest.approx(0.6 * 9.80665 * 1.85 / 2.7)
     assert DriveLimits.usual(lorry, lateral_mps2=5.0).lateral_mps2 == 5.0
     assert DriveLimits.usual(lorry.replace(cg_height_m=0.0)).lateral_mps2 == 8.5
+
+
+def test_what_is_given_up_on_the_way_would_not_have_fitted(start: Model) -> None:
+    """Whatever stays on its ground is driven to the end, and as it is without limits."""
+    ground = DriveLimits(20.0, 6.0, area_m=(90.0, 50.0))
+    ended = []
+    for m in (m for alternatives in menu(ground, start.vehicle) for m in alternatives[::4]):
+        ends = [
+            _driven(start, m, farthest_m=farthest_m) for farthest_m in (np.inf, ground.farthest_m)
+        ]
+        if isinstance(ends[1], NumericalError):
+            assert not ground.hold(ends[0])
+            ended.append(str(ends[1]))
+        else:
+            np.testing.assert_array_equal(ends[1].states, ends[0].states)
+    assert 0 < len(ended) < 60
+    assert all("more than 102.956 m from where it began" in told for told in ended)
+
+
+def _driven(car: Model, m: Manoeuvre, farthest_m: float) -> Any:
+    quiet = SensorNoise.none()
+    try:
+        return drive_truth(car, m, seed=0, noise=quiet, rate_hz=20.0, farthest_m=farthest_m)
+    except NumericalError as failure:
+        return failure
+
+
+def test_no_manoeuvre_is_tried_twice(start: Model) -> None:
+    for alternatives in menu(DriveLimits(20.0, 6.0, area_m=(60.0, 40.0)), start.vehicle):
+        assert len({str(m) for m in alternatives}) == len(alternatives)

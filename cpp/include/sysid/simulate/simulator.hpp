@@ -1,6 +1,7 @@
 // A closed-loop drive: a driver follows references of speed and path curvature with the car.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "sysid/dynamics/step.hpp"
@@ -28,12 +29,15 @@ struct Drive {
     std::vector<double> inputs;   // samples x (steer, force)
     std::vector<double> states;   // samples x kModelStates
     std::vector<double> outputs;  // samples x kChannels, free of noise
-    std::size_t lost_at = 0;      // sample at which the car spun or stopped; samples if it did not
+    std::size_t lost_at =
+        0;  // sample at which the car spun, stopped or went too far; samples if not
 };
 
-/// `disturbance`: samples x kExternals. The drive ends where the car is lost.
+/// `disturbance`: samples x kExternals. The drive ends where the car is lost, or farther than
+/// `farthest_m` from where it began.
 Drive simulate(const SingleTrack& model, const double* p, double dt,
                const std::vector<Reference>& references, const Driver& driver,
-               const double* disturbance, const Beginning& beginning, const Logged& logged = {});
+               const double* disturbance, const Beginning& beginning, const Logged& logged = {},
+               double farthest_m = std::numeric_limits<double>::infinity());
 
 }  // namespace sysid

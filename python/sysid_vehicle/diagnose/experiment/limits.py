@@ -78,6 +78,11 @@ class DriveLimits:
             lateral = min(lateral, _BELOW_TIPPING * tips_mps2)
         return cls(**{"speed_mps": speed, "lateral_mps2": lateral, **others})
 
+    @property
+    def farthest_m(self) -> float:
+        """What no two places of a drive within them are apart by more."""
+        return np.inf if self.area_m is None else float(np.hypot(*self.area_m))
+
     def hold(self, drive: Drive) -> bool:
         """Whether a drive stayed within them."""
         speed, lateral = drive.states[:, 0], drive.outputs[:, 4]
@@ -116,7 +121,7 @@ def menu(limits: DriveLimits, car: Vehicle) -> list[tuple[Manoeuvre, ...]]:
         for slow in (_SLOWER if limits.area_m is not None else _SLOWER[:1])
         for gentle in _EASIER
     )
-    return list(zip(*several, strict=True))
+    return [tuple(dict.fromkeys(alternatives)) for alternatives in zip(*several, strict=True)]
 
 
 def _menu(top: float, lateral: float, length: float) -> list[Manoeuvre]:

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+import numpy as np
+
 from ..._common.arguments import check_positive
 from ..._common.printed import Part, Printed, Table
 from ..._common.progress import with_progress
@@ -242,7 +244,7 @@ def suggest_manoeuvre(
     found, refused = [], 0
     choice = menu(bounds, _as_fitted(known.car).vehicle)
     for alternatives in with_progress(choice, "manoeuvres", shown=progress):
-        tried = ((m, _driven(known.car, m, fit)) for m in alternatives)
+        tried = ((m, _driven(known.car, m, fit, bounds)) for m in alternatives)
         driven = next(((m, d) for m, d in tried if d is not None and bounds.hold(d)), None)
         if driven is None:
             refused += 1
@@ -304,12 +306,24 @@ def _as_fitted(car: Model) -> Model:
     return replace(car, vehicle=car.vehicle.replace(**tyres))
 
 
-def _driven(car: Model, manoeuvre: Manoeuvre, fit: Fit) -> Drive | None:
-    """The drive without noise, at the rate of the longest log; None where the car is lost."""
+def _driven(
+    car: Model, manoeuvre: Manoeuvre, fit: Fit, within: DriveLimits | None = None
+) -> Drive | None:
+    """The drive without noise, at the rate of the longest log; None where the car is lost.
+
+    Nor is it driven where its length, or the way from its begin, is not within limits.
+    """
     rate = max(fit.driving.logs, key=lambda log: log.duration_s).rate_hz
+    if within is not None and round(manoeuvre.duration_s * rate) / rate > within.duration_s:
+        return None
     try:
         return drive_truth(
-            _as_fitted(car), manoeuvre, seed=0, noise=SensorNoise.none(), rate_hz=rate
+            _as_fitted(car),
+            manoeuvre,
+            seed=0,
+            noise=SensorNoise.none(),
+            rate_hz=rate,
+            farthest_m=np.inf if within is None else within.farthest_m,
         )
     except (NumericalError, InvalidInput):
         return None

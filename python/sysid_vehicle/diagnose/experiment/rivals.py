@@ -17,17 +17,17 @@ Where nothing is shown yet, effects of typical size are apart as `information.py
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.memo import remembered
 from ...effects import Effect
-from ...errors import InvalidInput, NumericalError
+from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine
+from ...identify import Fit, refine_from, refit
 from ...model import Model
 from ...rules import USUAL
 from ...simulate import Drive
@@ -87,7 +87,7 @@ class Foreseen:
         if size is not None:
             sizes[0] = size
         # Without it what it does counts as a disturbance, in which hardly anything is told apart.
-        best = _likeliest(fit, effects[0], sizes[0])
+        best = _likeliest(fit, effects[0])
         if best is not None and best.log_likelihood > fit.log_likelihood:
             fit = replace(fit, noise=best.noise)
         here = information_of(fit, fit.driving, effects)
@@ -140,11 +140,7 @@ class Fitted:
     @classmethod
     def of(cls, fit: Fit, effects: Sequence[Effect]) -> Fitted | None:
         """None where none of them is shown, or one cannot be fitted."""
-        scored = _scored(fit, effects)
-        fits = [
-            _likeliest(fit, e, typical(e), *([scored[e.id]] if e.id in scored else []))
-            for e in effects
-        ]
+        fits = [_likeliest(fit, e) for e in effects]
         found = [f for f in fits if f is not None]
         if len(found) < len(fits) or not any(
             _is_shown(fit, f, e) for f, e in zip(found, effects, strict=True)
@@ -230,26 +226,23 @@ def with_size(model: Model, e: Effect, size: Size) -> Model:
     )
 
 
-def _likeliest(fit: Fit, e: Effect, *sizes: Size) -> Fit | None:
-    """The likeliest fit with an effect, from nothing and from some sizes; None where all fail."""
-    found = []
-    for begin in (fit.model.add(e), *(with_size(fit.model, e, size) for size in sizes)):
-        with suppress(NumericalError, InvalidInput, np.linalg.LinAlgError):
-            found.append(refine(begin, fit.driving, fit.noise))
-    return max(found, key=lambda f: f.log_likelihood, default=None)
+@remembered(16)
+def _likeliest(fit: Fit, e: Effect) -> Fit | None:
+    """The likeliest fit with an effect; None where it cannot be fitted.
+
+    From the size that its score foretells, with its time where one is sought, from nothing, and
+    from its typical size.
+    """
+    scored = [
+        tuple(v - p.null_value for v, p in zip(s.value, e.parameters, strict=True))
+        for s in score_board(fit, fit.driving, (e,)).scores
+    ]
+    begins = [with_size(fit.model, e, size) for size in (*scored, typical(e))]
+    begins.insert(len(scored), fit.model.add(e))
+    return refine_from(begins, fit.driving, fit.noise)
 
 
-def _scored(fit: Fit, effects: Sequence[Effect]) -> dict[str, Size]:
-    """The sizes that scores foretell: of an effect whose time is sought with its time."""
-    board = score_board(fit, fit.driving, tuple(effects))
-    return {
-        s.effect.id: tuple(
-            v - p.null_value for v, p in zip(s.value, s.effect.parameters, strict=True)
-        )
-        for s in board.scores
-    }
-
-
+@remembered(16)
 def _of_usual_size(fit: Fit, e: Effect) -> Model:
     """The fit's model with the size that data and a normal prior of the typical size give."""
     priors = {
@@ -257,11 +250,25 @@ def _of_usual_size(fit: Fit, e: Effect) -> Model:
         for name, p in e.named.items()
         if not p.scan
     }
+    model = fit.model.with_priors(priors)
     try:
-        likely = refine(fit.model.with_priors(priors), fit.driving, fit.noise).model
+        near = model.with_values(_by_covariance(fit, priors))
+        likely = refit(near, fit.driving, fit.noise).model
     except (NumericalError, np.linalg.LinAlgError):
         return fit.model
     return fit.model.with_values(likely.values)
+
+
+def _by_covariance(fit: Fit, priors: dict[str, tuple[float, float]]) -> dict[str, float]:
+    """Where the likelihood and priors lead if the fit's covariance says all about it."""
+    names = fit.model.free_names
+    of = [names.index(n) for n in priors]
+    mean, std = np.array(list(priors.values())).reshape(-1, 2).T
+    x, covariance = np.array([fit.model.value(n) for n in names]), fit.covariance
+    weight = np.linalg.solve(covariance[np.ix_(of, of)] + np.diag(std**2), mean - x[of])
+    lower, upper = np.array([fit.model.bounds(n) for n in names]).T
+    moved = np.clip(x + covariance[:, of] @ weight, lower, upper)
+    return dict(zip(names, map(float, moved), strict=True))
 
 
 def _is_shown(fit: Fit, richer: Fit, e: Effect) -> bool:
