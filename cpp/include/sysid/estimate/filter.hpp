@@ -25,6 +25,14 @@ namespace sysid {
 
 enum class Method { kExtended, kUnscented, kSquareRoot };
 
+/// Whether somebody may go back over what the filter did: a model that only runs ahead says that
+/// it is not `kSmoothed`, and the filter works out no transition of the states.
+template <class Model>
+constexpr bool kSmoothed = [] {
+    if constexpr (requires { Model::kSmoothed; }) return Model::kSmoothed;
+    return true;
+}();
+
 /// Follows the measurement noise by the residuals after the update (Mohamed & Schwarz, 1999): each
 /// diagonal element is rescaled within [floor, ceiling] times its nominal variance.
 struct NoiseAdaptation {
@@ -123,8 +131,10 @@ class Filter {
             factorise();
             const auto t = transform<NX, NX>(f, state_.mean, root_, weights_);
             // The regression of the new on the old state: what a smoother takes for the transition.
-            state_.transition = t.slope_times_L;
-            solve_from_the_right<NX, NX>(root_, state_.transition);
+            if constexpr (kSmoothed<Model>) {
+                state_.transition = t.slope_times_L;
+                solve_from_the_right<NX, NX>(root_, state_.transition);
+            }
             if constexpr (method == Method::kUnscented) {
                 state_.mean = t.mean;
                 state_.covariance = t.covariance(weights_) + Q;

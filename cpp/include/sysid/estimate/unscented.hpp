@@ -39,13 +39,13 @@ struct SigmaWeights {
 template <int N>
 Mat<N, N> factor_of(const Mat<N, N>& P, std::size_t sample) {
     constexpr double kRounding = 1e-9;
-    Mat<N, N> lower, inverse;
+    Mat<N, N> lower;
     if (!P.allFinite()) throw NumericalFailure("the covariance is not finite", sample);
-    if (cholesky<N>(P, lower, inverse)) return lower;
+    if (cholesky<N>(P, lower)) return lower;
     Mat<N, N> repaired = P;
     if (!(lift_correlations<N>(repaired, 1e-3 * kRounding) > -kRounding))
         throw NumericalFailure("the covariance is not positive definite", sample);
-    if (!cholesky<N>(repaired, lower, inverse))
+    if (!cholesky<N>(repaired, lower))
         throw NumericalFailure("the covariance is not positive definite", sample);
     return lower;
 }
@@ -53,8 +53,8 @@ Mat<N, N> factor_of(const Mat<N, N>& P, std::size_t sample) {
 /// Any root of a covariance that may be singular, such as that of a noise.
 template <int N>
 Mat<N, N> root_of(const Mat<N, N>& Q, std::size_t sample) {
-    Mat<N, N> lower, inverse;
-    if (cholesky<N>(Q, lower, inverse)) return lower;
+    Mat<N, N> lower;
+    if (cholesky<N>(Q, lower)) return lower;
     if (!Q.allFinite()) throw NumericalFailure("a noise covariance is not finite", sample);
     const auto [values, vectors] = spectrum<N>(Q);
     if (values[0] < -1e-12 * std::abs(values[N - 1]))
@@ -71,9 +71,11 @@ struct Transformed {
     Mat<NZ, NX> slope_times_L;  // regression matrix H times L
 
     Mat<NZ, NZ> covariance(const SigmaWeights& w) const {
-        Mat<NZ, NZ> P = times_transposed<NZ, NX, NZ>(plus, plus);
-        const Mat<NX, NZ> turned = transposed<NZ, NX>(minus);
-        add_product<NZ, NX, NZ>(minus.data(), turned.data(), 1.0, P.data());
+        Mat<NZ, NZ> P = Mat<NZ, NZ>::Zero();
+        add_square<NZ, NX>(plus, P);
+        add_square<NZ, NX>(minus, P);
+        for (int j = 1; j < NZ; ++j)
+            for (int i = 0; i < j; ++i) P(i, j) = P(j, i);
         for (int j = 0; j < NZ; ++j)
             for (int i = 0; i < NZ; ++i)
                 P(i, j) = w.covariance_centre * centre[i] * centre[j] + w.other * P(i, j);

@@ -18,24 +18,34 @@ void symmetrise(Mat<N, N>& P) {
         for (int i = 0; i < j; ++i) P(i, j) = P(j, i) = 0.5 * (P(i, j) + P(j, i));
 }
 
-/// Cholesky factor of `S` and the inverse of the factor; false where `S` is not positive definite.
-/// Plain loops over a size the compiler knows: several times faster than a general factorisation.
+/// Cholesky factor of `S`; false where `S` is not positive definite.
+/// Plain loops over a size the compiler knows, along columns as they are stored: several times
+/// faster than a general factorisation.
+template <int N>
+bool cholesky(const Mat<N, N>& S, Mat<N, N>& lower) {
+    lower.setZero();
+    for (int j = 0; j < N; ++j) {
+        double* column = lower.data() + N * j;
+        for (int i = j; i < N; ++i) column[i] = S(i, j);
+        for (int k = 0; k < j; ++k) {
+            const double* before = lower.data() + N * k;
+            const double share = before[j];
+            for (int i = j; i < N; ++i) column[i] -= before[i] * share;
+        }
+        if (!(column[j] > 0.0)) return false;
+        column[j] = std::sqrt(column[j]);
+        const double per_pivot = 1.0 / column[j];
+        for (int i = j + 1; i < N; ++i) column[i] *= per_pivot;
+    }
+    return true;
+}
+
+/// The same and the inverse of the factor.
 template <int N>
 bool cholesky(const Mat<N, N>& S, Mat<N, N>& lower, Mat<N, N>& inverse) {
-    lower.setZero();
     inverse.setZero();
-    for (int j = 0; j < N; ++j) {
-        double d = S(j, j);
-        for (int k = 0; k < j; ++k) d -= lower(j, k) * lower(j, k);
-        if (!(d > 0.0)) return false;
-        lower(j, j) = std::sqrt(d);
-        inverse(j, j) = 1.0 / lower(j, j);
-        for (int i = j + 1; i < N; ++i) {
-            double s = S(i, j);
-            for (int k = 0; k < j; ++k) s -= lower(i, k) * lower(j, k);
-            lower(i, j) = s * inverse(j, j);
-        }
-    }
+    if (!cholesky<N>(S, lower)) return false;
+    for (int j = 0; j < N; ++j) inverse(j, j) = 1.0 / lower(j, j);
     for (int j = 0; j < N; ++j)
         for (int i = j + 1; i < N; ++i) {
             double s = 0.0;

@@ -49,6 +49,18 @@ inline Mat<R, C> transposed_times(const Mat<K, R>& A, const Mat<K, C>& B) {
     return times<R, K, C>(transposed<K, R>(A), B);
 }
 
+/// Adds the lower triangle of A A'.
+template <int R, int K>
+inline void add_square(const Mat<R, K>& A, Mat<R, R>& out) {
+    for (int j = 0; j < R; ++j)
+        for (int k = 0; k < K; ++k) {
+            const double b = A(j, k);
+            const double* from = A.data() + R * k;
+            double* to = out.data() + R * j;
+            for (int i = j; i < R; ++i) to[i] += from[i] * b;
+        }
+}
+
 /// X - A B'.
 template <int R, int K, int C>
 inline Mat<R, C> less_times_transposed(const Mat<R, C>& X, const Mat<R, K>& A, const Mat<C, K>& B) {

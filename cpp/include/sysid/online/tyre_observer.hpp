@@ -16,6 +16,7 @@ namespace sysid {
 
 struct TyreModel {  // observer B
     static constexpr double kSteerLagS = 0.1;
+    static constexpr bool kSmoothed = false;
     // Stiffness and grip are logarithms of what the tyre of the vehicle file is multiplied by;
     // errors are in units of their standard deviation.
     enum State {
