@@ -98,15 +98,17 @@ def _of(fit: Fit, driving: Driving) -> Iterator[tuple[str, Explainable]]:
     names = [f"missing {target}" for target in missing.targets]
     yield from _named(names, driving, inputs, rows, as_float64(force - force.mean(axis=0)))
     for seconds, errors in zip(_AHEAD_S, ahead, strict=True):
-        # Channels that were read at the same samples are regressed together.
-        alike: dict[bytes, list[int]] = {}
+        # Channels that were read at the same samples are regressed together, the speed alone.
+        alike: dict[tuple[bool, bytes], list[int]] = {}
         there = np.isfinite(errors) & np.isfinite(driving.measured)
-        for j in range(len(MEASURED)):
-            alike.setdefault(there[:, j].tobytes(), []).append(j)
-        for few in alike.values():
+        for j, channel in enumerate(MEASURED):
+            alike.setdefault((channel == "vx_mps", there[:, j].tobytes()), []).append(j)
+        before = Inputs.of(fit, driving, driving, speed_until_s=seconds).train
+        for (of_speed, _), few in alike.items():
             rows = np.flatnonzero(there[:, few[0]])
             names = [f"error of {WORDS[MEASURED[j]]} {seconds:g} s ahead" for j in few]
-            yield from _named(names, driving, inputs, rows, as_float64(errors[rows][:, few]))
+            known = before if of_speed else inputs
+            yield from _named(names, driving, known, rows, as_float64(errors[rows][:, few]))
 
 
 def _named(
