@@ -112,20 +112,20 @@ def from_size(
     parameters = c.effect.parameters
     sides = 0.5 if len(parameters) == 1 and parameters[0].one_sided else 1.0
     degrees, ratio = len(parameters), max(c.variance_ratio, 1.0)
-    least = -np.inf
+    significant = -np.inf  # the likelihood at which the p-value is `alpha`
     if alpha < sides * tests:
-        least = fit.log_likelihood + 0.5 * ratio * float(
+        significant = fit.log_likelihood + 0.5 * ratio * float(
             scipy.special.chdtri(degrees, alpha / sides / tests)
         )
     try:
         model = fit.model.add(c.effect).with_values(size)
-        likelier = refine_above(model, fit.driving, fit, least, rival)
+        likelier = refine_above(model, fit.driving, fit, significant, rival)
     except (NumericalError, np.linalg.LinAlgError):
         return c
     if likelier is None:
         return c
-    least = -np.inf if rival is None else rival.log_likelihood
-    if not likelier.converged and far_below(likelier.log_likelihood, least):
+    of_rival = -np.inf if rival is None else rival.log_likelihood
+    if not likelier.converged and far_below(likelier.log_likelihood, of_rival):
         return replace(c, fit=likelier)
     found = _with_fit(fit, c, likelier)
     alone = sides * float(scipy.special.chdtrc(degrees, max(found.statistic, 0.0) / ratio))
