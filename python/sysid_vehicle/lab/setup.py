@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._common.text import html_text
+from ..effects.scale import ORDINARY_MASS_KG
 from ..errors import InvalidInput
 from ..model import Model
 from ..tyre import Tyre
@@ -99,8 +100,9 @@ class Setup:
         """Drive any model, with mass and geometry known and the tyres guessed.
 
         Wheel forces are those of an ordinary car, and larger where these would not accelerate a
-        heavy one by 2.5 and brake it by 4 m/s2. What the observer takes for unknown forces is
-        larger by as much.
+        heavy one by 2.5 and brake it by 4 m/s2. Those of a car below 700 kg are smaller in
+        proportion to its mass. What the observer takes for unknown forces is larger, or smaller,
+        by as much.
 
         Parameters
         ----------
@@ -113,6 +115,7 @@ class Setup:
         more = max(
             1.0, mass_kg * _DRIVES_MPS2 / _FORCE.most, -mass_kg * _BRAKES_MPS2 / _FORCE.least
         )
+        more *= min(mass_kg / ORDINARY_MASS_KG[0], 1.0)
         force = Actuator(more * _FORCE.least, more * _FORCE.most, more * _FORCE.rate_limit)
         process = tuple(v * (more**2 if i > 2 else 1.0) for i, v in enumerate(Online.process))
         return cls(

@@ -12,11 +12,12 @@ from .on_path import (
     slalom,
     straight_acceleration,
 )
-from .open_loop import ramp_steer, sine_sweep, sine_with_dwell, step_steer
+from .open_loop import STEP_S, ramp_steer, sine_sweep, sine_with_dwell, step_steer
 from .recognise import Recognised, recognise
 from .steady import peak_lateral_mps2, steady_steer, understeer_gradient
 
 __all__ = [
+    "STEP_S",
     "Curvature",
     "Curve",
     "Knots",

@@ -55,12 +55,16 @@ class _Track:
         )
 
 
+STEP_S = (0.2, 1.8)
+"""How long the step of an ordinary car rises, and how long it holds."""
+
+
 @typed
 def step_steer(
     speeds_mps: Sequence[float] = (17.0, 24.0, 31.0),
     lateral_mps2: Sequence[float] = (3.0, 6.0),
-    rise_s: float = 0.2,
-    hold_s: float = 1.8,
+    rise_s: float = STEP_S[0],
+    hold_s: float = STEP_S[1],
 ) -> Manoeuvre:
     """Step the steering angle to both sides, as in ISO 7401.
 

@@ -7,7 +7,7 @@ import pytest
 
 from sysid_vehicle import DriveLimits, Model, NumericalError
 from sysid_vehicle.diagnose.experiment.limits import menu
-from sysid_vehicle.manoeuvres import Manoeuvre
+from sysid_vehicle.manoeuvres import Knots, Manoeuvre
 from sysid_vehicle.simulate import SensorNoise, drive_truth
 
 
@@ -56,3 +56,20 @@ def _driven(car: Model, m: Manoeuvre, farthest_m: float) -> Any:
 def test_no_manoeuvre_is_tried_twice(start: Model) -> None:
     for alternatives in menu(DriveLimits(20.0, 6.0, area_m=(60.0, 40.0)), start.vehicle):
         assert len({str(m) for m in alternatives}) == len(alternatives)
+
+
+def first_rise_s(car: Model) -> float:
+    """How long the first step of the first step steer of the menu rises."""
+    vehicle = car.vehicle
+    manoeuvres = [several[0] for several in menu(DriveLimits.usual(vehicle), vehicle)]
+    curve = next(m for m in manoeuvres if m.name == "step_steer").lateral_mps2
+    assert isinstance(curve, Knots)
+    moved = [i for i, value in enumerate(curve.value) if value != 0.0]
+    return float(curve.time_s[moved[0]] - curve.time_s[moved[0] - 1])
+
+
+def test_steps_of_a_long_vehicle_rise_more_slowly(start: Model) -> None:
+    car = start.vehicle
+    bus = car.replace(lf_m=3.5, lr_m=2.5, mass_kg=14000.0, yaw_inertia_kgm2=2e5)
+    assert first_rise_s(start) == pytest.approx(0.2)
+    assert first_rise_s(Model(bus)) == pytest.approx(0.2 * (6.0 / 3.5) ** 0.5)

@@ -6,7 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput, Model, NumericalError, Tyre, published
+import model_cars
+from sysid_vehicle import (
+    DriveLimits,
+    InvalidInput,
+    Model,
+    NumericalError,
+    Tyre,
+    example_vehicle,
+    published,
+)
 from sysid_vehicle.identify.search.search import Box, minimise
 from sysid_vehicle.lab import (
     Design,
@@ -166,10 +175,32 @@ def test_a_design_draws_and_shows_itself(design: Design) -> None:
 
 
 def test_limits_that_leave_nothing_are_told(setup: Setup) -> None:
-    with pytest.raises(NumericalError, match="lateral acceleration"):
+    with pytest.raises(NumericalError, match="road width"):
         design_excitation(
-            setup, limits=Limits(lateral_mps2=2.0), duration_s=10.0, trials=2, uncertainty=0.0
+            setup, limits=Limits(road_width_m=0.1), duration_s=10.0, trials=2, uncertainty=0.0
         )
+
+
+def test_limits_follow_the_car(setup: Setup) -> None:
+    car = setup.plant.vehicle
+    lorry = car.replace(mass_kg=12000.0, lf_m=3.5, lr_m=2.5, yaw_inertia_kgm2=1e5, cg_height_m=1.2)
+    assert Limits.usual(car) == Limits()
+    assert Limits.usual(lorry).lateral_mps2 == DriveLimits.usual(lorry).lateral_mps2
+    assert Limits.usual(lorry).fastest_mps == pytest.approx(45.0 * 25.0 / 36.0)
+    assert Limits.usual(lorry, fastest_mps=20.0).fastest_mps == 20.0
+
+
+@pytest.mark.parametrize("name", ["model", "lorry"])
+def test_a_model_car_and_a_lorry_have_designs_by_default(name: str) -> None:
+    """With the limits of an ordinary car the one left the road and the other tipped over."""
+    lorry = example_vehicle().replace(
+        mass_kg=12000.0, lf_m=3.5, lr_m=2.5, yaw_inertia_kgm2=1e5, cg_height_m=1.2
+    )
+    car = model_cars.car() if name == "model" else lorry
+    made = design_excitation(Setup.of(Model(car)), duration_s=20.0, trials=8)
+    assert not made.best.broken
+    assert np.abs(made.preview.drive.truth["ay_mps2"]).max() <= made.limits.lateral_mps2
+    assert made.preview.drive.truth["vx_mps"].max() <= 36.0 * min(car.wheelbase_m / 2.0, 1.0) ** 0.5
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,8 @@ class DriveLimits:
 def menu(limits: DriveLimits, car: Vehicle) -> list[tuple[Manoeuvre, ...]]:
     """Manoeuvres of the library at several speeds and strengths within the limits.
 
-    Circles and rows of cones are as many times those of ordinary cars as the car is.
+    Circles and rows of cones are as many times those of ordinary cars as the car is. Steps of a
+    long one last longer, as the root of its length: it answers so much later.
 
     Parameters
     ----------
@@ -117,15 +118,20 @@ def menu(limits: DriveLimits, car: Vehicle) -> list[tuple[Manoeuvre, ...]]:
     lateral = min(limits.lateral_mps2, peak_lateral_mps2(car))
     length = length_beyond(car.wheelbase_m)
     several = (
-        _menu(slow * limits.speed_mps, gentle * lateral, slow**2 * length)
+        _menu(slow * limits.speed_mps, gentle * lateral, slow**2 * length, max(length, 1.0) ** 0.5)
         for slow in (_SLOWER if limits.area_m is not None else _SLOWER[:1])
         for gentle in _EASIER
     )
     return [tuple(dict.fromkeys(alternatives)) for alternatives in zip(*several, strict=True)]
 
 
-def _menu(top: float, lateral: float, length: float) -> list[Manoeuvre]:
+def _menu(top: float, lateral: float, length: float, time: float) -> list[Manoeuvre]:
     slow, fast = 0.5 * top, 0.8 * top
+
+    def steps(speeds: tuple[float, ...], sizes: tuple[float, ...]) -> Manoeuvre:
+        rise_s, hold_s = (time * s for s in manoeuvres.STEP_S)
+        return manoeuvres.step_steer(speeds, sizes, rise_s, hold_s)
+
     found = [
         manoeuvres.sine_sweep(speed_mps=v, lateral_mps2=share * lateral, duration_s=t)
         for v in (slow, fast)
@@ -133,9 +139,9 @@ def _menu(top: float, lateral: float, length: float) -> list[Manoeuvre]:
         for t in (20.0, 40.0)
     ]
     found += [
-        manoeuvres.step_steer((0.45 * top, 0.65 * top, 0.85 * top), (0.3 * lateral, 0.6 * lateral)),
-        manoeuvres.step_steer((0.45 * top,), (0.4 * lateral, 0.7 * lateral)),
-        manoeuvres.step_steer((0.85 * top,), (0.4 * lateral, 0.7 * lateral)),
+        steps((0.45 * top, 0.65 * top, 0.85 * top), (0.3 * lateral, 0.6 * lateral)),
+        steps((0.45 * top,), (0.4 * lateral, 0.7 * lateral)),
+        steps((0.85 * top,), (0.4 * lateral, 0.7 * lateral)),
         manoeuvres.ramp_steer((slow,), 0.95 * lateral),
         manoeuvres.ramp_steer((slow, fast), 0.95 * lateral),
         manoeuvres.sine_with_dwell(0.6 * top, (0.3 * lateral, 0.5 * lateral, 0.7 * lateral)),

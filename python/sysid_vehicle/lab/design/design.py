@@ -15,11 +15,14 @@ from ..._common.printed import Part, Printed
 from ..._common.progress import doing
 from ..._common.style import AFTER, BEFORE, axes_or_new, tidy
 from ..._common.threads import Workers
+from ...diagnose import DriveLimits
+from ...effects import length_beyond
 from ...errors import InvalidInput, NumericalError
 from ...manoeuvres import peak_lateral_mps2
 from ...model import Model
-from ...vehicle import AXLES
+from ...vehicle import AXLES, Vehicle
 from ..excitation import Excitation, Weaving
+from ..excitation.weaving import LEAST_MPS
 from ..observer.observed import READINGS
 from ..setup import Setup
 from .information import TYRES
@@ -71,6 +74,30 @@ class Limits:
                 f"Limits: fastest_mps = {self.fastest_mps:g} leaves no room above slowest_mps = "
                 f"{self.slowest_mps:g}; 2 m/s and more are needed"
             )
+
+    @classmethod
+    def usual(cls, vehicle: Vehicle, **others: float) -> Limits:
+        """Limits that suit a car: what a driver could drive (`DriveLimits.usual`), and more speed.
+
+        Speeds are in proportion to the top speed of a driver's, widths to the length of the car. The
+        lateral acceleration is that of a driver's only where the car would tip over.
+
+        Parameters
+        ----------
+        vehicle : Vehicle
+        **others
+            Limits that are known.
+        """
+        driver = DriveLimits.usual(vehicle)
+        share = driver.speed_mps / DriveLimits.speed_mps
+        tips = driver.lateral_mps2 < DriveLimits.lateral_mps2
+        found = {
+            "slowest_mps": max(share * cls.slowest_mps, LEAST_MPS),
+            "fastest_mps": share * cls.fastest_mps,
+            "road_width_m": length_beyond(vehicle.wheelbase_m) * cls.road_width_m,
+            "lateral_mps2": driver.lateral_mps2 if tips else cls.lateral_mps2,
+        }
+        return cls(**{**found, **others})
 
     def broken(self, seen: Preview) -> list[tuple[str, float]]:
         """Name each limit that a drive breaks, and by what share."""
@@ -196,7 +223,7 @@ def design_excitation(
     believed : Model, optional
         What is known of the car so far; the setup's plant if left out.
     limits : Limits, optional
-        What the drive must keep to; `Limits()` if left out.
+        What the drive must keep to; `Limits.usual` of the believed car if left out.
     duration_s : float
         Length of the drive.
     free : sequence of str
@@ -225,7 +252,7 @@ def design_excitation(
     """
     setup = setup if setup is not None else Setup.default()
     believed = believed if believed is not None else setup.plant
-    limits = limits if limits is not None else Limits()
+    limits = limits if limits is not None else Limits.usual(believed.vehicle)
     if not (trials >= 2 and 0.0 <= uncertainty < 0.5 and 10.0 <= duration_s <= 1000.0):
         raise InvalidInput(
             f"design_excitation: trials = {trials!r}, uncertainty = {uncertainty!r}, duration_s = "
@@ -273,14 +300,20 @@ def _box(believed: Model, setup: Setup, limits: Limits) -> _Box:
     """What a design chooses, and from where to where; the swing is a share of the room it has."""
     tyres = {f"tyre_{axle}": believed.tyre(axle) for axle in AXLES}
     grip = peak_lateral_mps2(believed.vehicle.replace(**tyres)) * setup.simulator.load_share
+    # Where the limit is below the grip, what is asked for is near the limit.
+    least, most = (0.8 * grip, 1.7 * grip)
+    if limits.lateral_mps2 < grip:
+        least, most = (0.5 * limits.lateral_mps2, 1.1 * limits.lateral_mps2)
     room = limits.fastest_mps - limits.slowest_mps
+    # Small cars are as much quicker as their times are shorter.
+    quick = length_beyond(believed.vehicle.wheelbase_m) ** -0.5
     return {
-        "lateral_mps2": (0.8 * grip, 1.7 * grip),
-        "from_hz": (0.15, 0.4),
-        "to_hz": (0.5, 1.2),
+        "lateral_mps2": (least, most),
+        "from_hz": (0.15 * quick, 0.4 * quick),
+        "to_hz": (0.5 * quick, 1.2 * quick),
         "mean_mps": (limits.slowest_mps + 0.25 * room, limits.slowest_mps + 0.75 * room),
         "swing_share": (0.0, 0.6),
-        "swing_period_s": (6.0, 15.0),
+        "swing_period_s": (6.0 / quick, 15.0 / quick),
     }
 
 

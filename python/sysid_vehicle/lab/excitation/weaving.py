@@ -13,6 +13,9 @@ from ...errors import InvalidInput
 from .excitation import Excitation
 from .multisine import MultiSine
 
+LEAST_MPS = 3.0
+"""Below it no weaving is asked for."""
+
 
 @dataclass(frozen=True)
 class Weaving(Excitation):
@@ -53,10 +56,10 @@ class Weaving(Excitation):
         check_positive_fields(
             self, "lateral_mps2", "from_hz", "to_hz", "period_s", "swing_period_s", "duration_s"
         )
-        if not self.mean_mps - abs(self.swing_mps) >= 3.0:
+        if not self.mean_mps - abs(self.swing_mps) >= LEAST_MPS:
             raise InvalidInput(
                 f"Weaving: the speed would fall to {self.mean_mps - abs(self.swing_mps):.3g} m/s; "
-                f"raise mean_mps or let swing_mps be less, so that 3 m/s are left"
+                f"raise mean_mps or let swing_mps be less, so that {LEAST_MPS:g} m/s are left"
             )
 
     @cached_property
