@@ -31,6 +31,21 @@ def test_a_lateral_speed_in_kmh_is_told(driven: dict[str, np.ndarray], gyro: flo
     assert list(incoherent(Driving.of(log), model)) == ["vy_mps"]
 
 
+@pytest.mark.parametrize(("unit", "times"), [("mph", 1.0 / 0.44704), ("knots", 1.0 / 0.5144444)])
+@pytest.mark.parametrize("forward_m", [-1.5, 0.0, 1.5])
+def test_other_units_are_told_wherever_the_sensor_is(
+    unit: str, times: float, forward_m: float
+) -> None:
+    """A lateral speed in mph or knots passed for one in m/s."""
+    truth = sv.Model(sv.example_vehicle()).add("speed_sensor_lever_arm")
+    truth = truth.with_values({"speed_sensor_lever_arm.forward_m": forward_m})
+    log = sv.drive(truth, sv.manoeuvres.lap(), seed=593217)
+    assert not [c for c in log.contradictions if c.channel == "vy_mps"]
+    wrong = {n: log[n] for n in log.channels} | {"vy_mps": times * log["vy_mps"]}
+    with pytest.warns(SysidWarning, match=rf"vy_mps: changes (1\.[89]|2\.).* times .*{unit}"):
+        sv.Log.from_arrays(wrong, name=unit)
+
+
 @pytest.mark.parametrize("late", ["ay_mps2", "yaw_rate_radps"])
 def test_what_is_late_is_told_as_late(driven: dict[str, np.ndarray], late: str) -> None:
     shifted = {n: v[:-10] if n == late else v[10:] for n, v in driven.items()}

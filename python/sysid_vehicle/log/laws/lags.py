@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from ..._common.arrays import FloatArray
-from .laws import UNNAMED, Contradiction
+from .laws import SPEED_UNITS, UNNAMED, Contradiction
 from .motion import Motion
-from .regression import Lag, Sides, find_lag, regress
+from .regression import SURE, Lag, Sides, find_lag, regress
 from .steering import several_frequencies, steering_lag
 
 _MIN_RATE_HZ = 18.0
@@ -95,10 +95,9 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     name = max(lags, key=lambda key: lags[key].gain)
     speed = float(np.median(m.mean(vx)[usable]))
     usual = max(_USUAL_S, _LEVER_M / speed)
-    y, x = sides(**{_SIDE[name]: 1.0})(lags[name].seconds)
-    late = regress(y[usable], x[usable], mean, spread)
-    slides, felt = sides()(0.0)
-    scale = _scale(slides[usable], felt[usable], spread, late.scale)
+    there = [sides(**{_SIDE[name]: 1.0})(at) for at in (0.0, lags[name].seconds)]
+    arm = m.change(c["yaw_rate_radps"])[usable]
+    scale = _scale([(y[usable], x[usable]) for y, x in there], arm, spread)
     if scale is not None:
         return [scale]
     if not _told(lags[name], usual, usual, _MIN_GAIN[name]):
@@ -111,26 +110,46 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     return [_note(name, others[name], lags[name])]
 
 
-def _scale(y: FloatArray, x: FloatArray, spread: FloatArray, most: float) -> Contradiction | None:
-    """Tell of a lateral speed in another unit where that explains more than any lag does.
+def _scale(
+    there: list[tuple[FloatArray, FloatArray]], arm: FloatArray, spread: FloatArray
+) -> Contradiction | None:
+    """Tell of a lateral speed in another unit: what it is nearer to than to metres per second.
 
     Parameters
     ----------
-    y, x : ndarray, shape (n,), (n, 3)
-        Change of the lateral speed; specific force, minus speed times yaw rate, one.
+    there : list of ndarray, shape (n,), and ndarray, shape (n, 3)
+        Change of the lateral speed; specific force, minus speed times yaw rate, one. As they are
+        and moved in time: what fits better counts.
+    arm : ndarray, shape (n,)
+        Change of the yaw rate, which a sensor ahead of the others adds.
     spread : ndarray, shape (3,)
         Of the prior for `x`.
-    most : float
-        What the best lag leaves of the change.
     """
-    sliding = np.column_stack([x[:, 0] + x[:, 1], x[:, 1:]])
-    found = regress(y, sliding, np.zeros(3), np.array([np.inf, *spread[1:]]))
-    times = float(found.coefficients[0])
-    if found.scale >= most or found.coherence < _COHERENT or times < math.exp(UNNAMED):
+    nearer = math.sqrt(min(SPEED_UNITS.values()))
+    # At one frequency an arm of the sensor looks like a unit, unless it would be too long.
+    for columns, reach, limit in (([arm], [_LEVER_M], nearer), ([], [], math.exp(UNNAMED))):
+        spreads = np.array([np.inf, *spread[1:], *reach])
+        found = min(
+            (
+                regress(
+                    y,
+                    np.column_stack([x[:, 0] + x[:, 1], x[:, 1:], *columns]),
+                    np.zeros(len(spreads)),
+                    spreads,
+                )
+                for y, x in there
+            ),
+            key=lambda fitted: fitted.scale,
+        )
+        times = float(found.coefficients[0])
+        if found.coherence >= _COHERENT and times - SURE * float(found.deviations[0]) > limit:
+            break
+    else:
         return None
+    units = ", ".join(f"{unit} {more:.3g}" for unit, more in SPEED_UNITS.items())
     text = (
         f"vy_mps: changes {times:.3g} times as much as ay_mps2 - vx_mps * yaw_rate_radps demands; "
-        f"check its unit (km/h make 3.6 times), and put its factor in the channel map"
+        f"check its unit ({units} times), and put its factor in the channel map"
     )
     return Contradiction("vy_mps", text)
 

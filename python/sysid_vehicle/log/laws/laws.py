@@ -26,6 +26,9 @@ _NOT_ONE = 5.0  # deviations from the right unit before another is looked for
 _FITS = 3.0  # deviations within which another unit fits
 UNNAMED = math.log(2.5)  # a scale that is farther off is refused although no unit explains it
 
+SPEED_UNITS = {"knots": 1.0 / 0.5144444, "mph": 1.0 / 0.44704, "ft/s": 1.0 / 0.3048, "km/h": 3.6}
+"""Units of speeds in logs, and how many of them are one metre per second."""
+
 Slip = tuple[str, str, str]
 Slipped = tuple[float, tuple[Slip, ...]]
 # What is named where it explains the coefficient best, and what else looks so; that is named beside

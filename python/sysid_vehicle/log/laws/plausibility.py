@@ -30,6 +30,7 @@ from .laws import (
     LIKE_MPH,
     MIN_WINDOWS,
     SCALE_STD,
+    SPEED_UNITS,
     VX_KMH,
     VX_MPH,
     WINDOW_S,
@@ -84,8 +85,8 @@ _LATERAL_SLIPS: Slips = (
     (_RAD / _G / 3.6, (_YAW_DEG, _AY_G, VX_KMH)),
 )
 _SLIDING_SLIPS: Slips = (
-    (3.6, (_VY_KMH,), ((1.0 / 0.3048, (_VY_FEET,)),)),
-    (1.0 / 0.44704, (_VY_MPH,), ((1.0 / 0.5144444, (_VY_KNOTS,)),)),
+    (SPEED_UNITS["km/h"], (_VY_KMH,), ((SPEED_UNITS["ft/s"], (_VY_FEET,)),)),
+    (SPEED_UNITS["mph"], (_VY_MPH,), ((SPEED_UNITS["knots"], (_VY_KNOTS,)),)),
 )
 
 

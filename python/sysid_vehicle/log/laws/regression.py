@@ -18,7 +18,7 @@ _BLOCK = 6  # windows that are taken as dependent when deviations are estimated
 _STEP_S = 0.01
 _REACH_S = 0.28
 _COARSE_S = 0.04
-_SURE = 3.0  # deviations of what is sure
+SURE = 3.0  # deviations of what is sure
 _ROUNDS = 6  # of two-stage least squares, whose coefficients begin at those of the other
 _TINY = 1e-12
 
@@ -72,7 +72,7 @@ class Lag:
 
     def beyond(self, late_s: float, early_s: float) -> bool:
         """Whether the lag surely leaves ``-early_s .. late_s`` and lies inside what was tried."""
-        sure = abs(self.seconds) - _SURE * self.deviation
+        sure = abs(self.seconds) - SURE * self.deviation
         limit = late_s if self.seconds > 0.0 else early_s
         return sure > limit and abs(self.seconds) < _REACH_S - 0.5 * _COARSE_S
 
@@ -142,7 +142,7 @@ def find_lag(
     if instruments is not None:
         other = _two_stage(rows, lag, mean, spread, instruments[usable])
         lost = math.sqrt(max(other[1] ** 2 - deviation**2, 0.0))
-        differ = abs(other[0] - lag) > _SURE * lost
+        differ = abs(other[0] - lag) > SURE * lost
     else:
         other, differ = (lag, deviation), False
     worse = _misfit(*rows(0.0), mean, spread, start)
