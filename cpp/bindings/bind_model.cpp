@@ -1,4 +1,6 @@
 // The model: vehicle data, the catalogue of effects, one evaluation.
+#include <utility>
+
 #include "arrays.hpp"
 #include "fields.hpp"
 #include "register.hpp"
@@ -53,6 +55,44 @@ py::list base_parameters() {
     return all;
 }
 
+/// Whether an effect changes numbers of the car itself: it acts at the stage `vehicle`.
+template <class E>
+constexpr bool kChangesCar = !std::is_same_v<
+    decltype(E::vehicle(std::declval<const double*>(), std::declval<Workings<double>&>())),
+    Inactive>;
+
+template <std::size_t... I>
+constexpr std::array<bool, kEffectCount> collect_changes_car(std::index_sequence<I...> /*unused*/) {
+    return {kChangesCar<std::tuple_element_t<I, Catalogue>>...};
+}
+constexpr auto kEffectsChangeCar = collect_changes_car(std::make_index_sequence<kEffectCount>{});
+
+/// The numbers of the car as its effects make them, by their names in a vehicle file.
+py::dict car_with_effects(const SingleTrack& model, const Array& p) {
+    const double* values = vector(p, kParameterCount, "parameters");
+    Workings<double> w{};
+    w.m = model.car.mass_kg;
+    w.I_z = values[kYawInertia];
+    w.l_f = model.car.lf_m;
+    w.l_r = model.car.lr_m;
+    w.h = model.car.cg_height_m;
+    w.drag_area = model.car.drag_area_m2;
+    w.brake_front = model.car.brake_front_share;
+    w.drive_front = model.car.drive_front_share;
+    for_each_active(model.effects, values + kBaseParameterCount,
+                    [&](auto e, const double* own, std::size_t) { return e.vehicle(own, w); });
+    py::dict d;
+    d["mass_kg"] = w.m;
+    d["yaw_inertia_kgm2"] = w.I_z;
+    d["lf_m"] = w.l_f;
+    d["lr_m"] = w.l_r;
+    d["cg_height_m"] = w.h;
+    d["drag_area_m2"] = w.drag_area;
+    d["brake_front_share"] = w.brake_front;
+    d["drive_front_share"] = w.drive_front;
+    return d;
+}
+
 py::list effects() {
     py::list all;
     for (std::size_t i = 0; i < kEffectCount; ++i) {
@@ -71,6 +111,7 @@ py::list effects() {
         d["same_in_all_logs"] = info.same_in_all_logs;
         d["refines"] = names(info.refines);
         d["on_request"] = info.on_request;
+        d["changes_car"] = kEffectsChangeCar[i];
         d["states"] = detail::kEffectStateCounts[i];
         d["scored_at_typical"] = info.scored_at_typical;
         d["needs_force"] = info.needs_force;
@@ -221,7 +262,8 @@ void register_model(py::module_& m) {
              py::arg("user") = std::vector<User>{}, py::arg("loads_known") = false,
              py::arg("inputs_held") = false)
         .def("evaluate", &evaluate, py::arg("parameters"), py::arg("motion"), py::arg("steer"),
-             py::arg("longitudinal"));
+             py::arg("longitudinal"))
+        .def("car", &car_with_effects, py::arg("parameters"));
     m.def("base_parameters", &base_parameters);
     m.def("effects", &effects);
     m.def("formula_parts", &formula_parts);

@@ -103,6 +103,7 @@ class SingleTrack(metaclass=_Bound):
     def evaluate(
         self, parameters: _Array, motion: _Array, steer: float, longitudinal: float
     ) -> _Array: ...
+    def car(self, parameters: _Array) -> dict[str, float]: ...
 
 class WrittenModel(metaclass=_Bound):
     # Only `write_model` makes one. Steps: operation, up to three operands (or -1), constant.

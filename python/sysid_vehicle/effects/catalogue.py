@@ -6,7 +6,7 @@ nothing is repeated here. Effects that users define stand beside them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Any
@@ -19,6 +19,7 @@ from .._common.arrays import FloatArray, as_float64
 from .._common.text import html_text
 from .._common.typed import typed, typed_fields
 from ..errors import InvalidInput, near_names
+from ..vehicle import Vehicle, vehicle_data
 from . import plugins
 
 Steps = tuple[Any, ...]
@@ -136,6 +137,8 @@ class Effect:
         A candidate only where a user names it.
     states : int
         How many states of its own it adds to the model.
+    changes_car : bool
+        It changes numbers that a vehicle file holds: `car_with` has them.
     acts : tuple
         Of an effect that a user defined: what its formulas add to, and their steps.
     channels : tuple of str
@@ -165,6 +168,7 @@ class Effect:
     acts: tuple[tuple[int, Any], ...] = ()
     channels: tuple[str, ...] = ()
     own_states: tuple[OwnState, ...] = ()
+    changes_car: bool = False
 
     @typed_fields
     def __post_init__(self) -> None:
@@ -209,6 +213,29 @@ class Effect:
         """What the core takes of a user's effect."""
         states = [(s.rate, s.decay, s.initial) for s in self.own_states]
         return self.index, [_channel_number(c) for c in self.channels], self.acts, states
+
+    def car_with(self, vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
+        """Return what the effect makes of a vehicle, by its own equation.
+
+        Parameters
+        ----------
+        vehicle : Vehicle
+        values : mapping of str to float
+            Of its parameters, by the names that they have in a model.
+
+        Raises
+        ------
+        InvalidInput
+            If no vehicle may have such numbers.
+        """
+        p = np.zeros(_core.PARAMETERS)
+        inertia = vehicle.yaw_inertia_kgm2
+        at = [b.name for b in base_parameters()].index("yaw_inertia_kgm2")
+        p[at] = vehicle.usual_inertia_kgm2 if inertia is None else inertia
+        for name, parameter in self.named.items():
+            p[parameter.column] = values[name]
+        core = _core.SingleTrack(vehicle_data(vehicle), self.bit, True)
+        return vehicle.replace(**core.car(p))
 
     @property
     def columns(self) -> list[int]:

@@ -10,10 +10,7 @@ import sysid_vehicle as sv
 from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.export.vehicle_file import vehicle_and_rest
 
-IN_FILE = (
-    *("mass", "yaw_inertia", "cg_position", "longitudinal_load_transfer"),
-    *("aero_drag", "force_split"),
-)
+IN_FILE = tuple(e.id for e in sv.catalogue() if e.changes_car)
 
 
 def predicted(model: sv.Model, fit: sv.Fit) -> np.ndarray:
@@ -37,6 +34,11 @@ def test_the_file_predicts_what_the_model_predicts(
     np.testing.assert_allclose(predicted(again, fit), wanted, rtol=1e-7, atol=1e-7)
     left = {e for e in again.effects if e != "ins_lever_arm"}
     assert left == {*effects} - {*IN_FILE}
+
+
+def test_every_effect_that_changes_the_car_is_known_to_do_so() -> None:
+    assert {"mass", "yaw_inertia", "cg_position", "aero_drag", "force_split"} < {*IN_FILE}
+    assert not {"aero_downforce", "head_wind", "steer_lag"} & {*IN_FILE}
 
 
 def test_only_what_has_no_place_is_named(tmp_path: Path, truth: sv.Model) -> None:
