@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ._common.arguments import real
 from ._common.arrays import FloatArray
 from ._common.files import refuse_unknown
-from ._common.typed import typed_fields
+from ._common.typed import typed, typed_fields
 from .errors import InvalidInput
 
 _CURVE_POINTS = 3001
@@ -102,15 +102,18 @@ class Tyre:
         """Cornering stiffness per vertical load, ``B C D`` [1/rad]."""
         return self.B * self.C * self.D
 
+    @typed
     def friction(self, slip_rad: npt.ArrayLike) -> FloatArray:
         """Lateral force per vertical load [-] at slip angles [rad]."""
         return magic_formula(slip_rad, self.B, self.C, self.D, self.E)
 
+    @typed
     def peak_slip_rad(self, largest_rad: float = 0.6) -> float:
         """Slip angle of the curve's peak [rad], at most `largest_rad`."""
         slip = np.linspace(0.0, largest_rad, _CURVE_POINTS)
         return float(slip[int(np.argmax(self.friction(slip)))])
 
+    @typed
     def replace(self, **changes: float) -> Tyre:
         """Return a copy with some coefficients changed."""
         refuse_unknown(changes, TYRE_RANGES, "tyre")

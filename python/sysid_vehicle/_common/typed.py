@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar, Union
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import InvalidInput, SysidError
 from .arguments import expect, real
@@ -152,6 +153,8 @@ def _refuse_other(value: object, hint: Any, where: str, error: Exception | None)
 
 def _fits(value: object, hint: Any) -> bool:
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if _takes_arrays(hint):
+        return (value is None and type(None) in inner) or _makes_an_array(value)
     if origin in (Union, types.UnionType):
         return any(_fits(value, one) for one in inner)
     if origin is Literal:
@@ -181,6 +184,12 @@ def _fits(value: object, hint: Any) -> bool:
     return True
 
 
+def _takes_arrays(hint: Any) -> bool:
+    """Whether a union holds all kinds of `numpy.typing.ArrayLike`, by itself or beside others."""
+    is_union = typing.get_origin(hint) in (Union, types.UnionType)
+    return is_union and {*typing.get_args(npt.ArrayLike)} <= {*typing.get_args(hint)}
+
+
 def _makes_an_array(value: object) -> bool:
     try:
         np.asarray(value, dtype=np.float64)
@@ -202,6 +211,8 @@ def _fits_several(value: object, origin: Any, inner: tuple[Any, ...]) -> bool:
 def _said(hint: Any) -> str:
     """The annotation in words."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if _takes_arrays(hint):
+        return "a number or an array of numbers"
     if origin in (Union, types.UnionType):
         return " or ".join(dict.fromkeys(_said(one) for one in inner))
     if origin is Literal:

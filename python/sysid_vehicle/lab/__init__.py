@@ -1,8 +1,9 @@
 """The closed-loop laboratory: drive, observe, learn the noise, identify the tyres."""
 
 from . import excitation
-from .design.design import Design, Limits, design_excitation
+from .design.design import Design, design_excitation
 from .design.information import information
+from .design.limits import Limits
 from .design.preview import Coverage, Expected, Preview, preview
 from .drive.loop import ClosedLoop, run_closed_loop
 from .drive.pictures import overview

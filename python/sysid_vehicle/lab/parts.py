@@ -8,6 +8,7 @@ import numpy as np
 
 from .._common.arguments import check_not_negative
 from .._common.arrays import FloatArray, as_float64
+from .._common.typed import typed, typed_fields
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .observer.observer import ObserverForm
@@ -39,6 +40,7 @@ class Sensor:
     rate_hz: float = 0.0
     present: bool = True
 
+    @typed_fields
     def __post_init__(self) -> None:
         for name in ("noise_std", "delay_s", "rate_hz"):
             value = getattr(self, name)
@@ -92,6 +94,7 @@ class Sensors:
             rows.append([s.noise_std if s.present else np.nan, s.bias, s.delay_s, s.rate_hz])
         return as_float64(rows)
 
+    @typed
     def normal(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Draw standard normal numbers for `n` samples, shape (n, 12)."""
         drawn = rng.standard_normal((n, len(self.names())))
@@ -119,6 +122,7 @@ class Actuator:
     rate_limit: float = _INF
     lag_s: float = 0.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         if not (self.least < self.most and self.rate_limit > 0.0 and self.lag_s >= 0.0):
             raise InvalidInput(
@@ -152,6 +156,7 @@ class Nominal:
     drag_nspm: float = 0.3
     gravity_mps2: float = GRAVITY_MPS2
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_not_negative(self)
         for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "stiffness_front"):
@@ -159,6 +164,7 @@ class Nominal:
                 raise InvalidInput(f"Nominal: {name} is zero; the controller divides by it")
 
     @classmethod
+    @typed
     def of(cls, vehicle: Vehicle, stiffness: float = 50.0) -> Nominal:
         """Take mass and geometry from a vehicle, and one stiffness for both axles."""
         v = vehicle
@@ -206,6 +212,7 @@ class Controller:
     lowest_speed_mps: float = 1.0
     added_speed_mps: float = 0.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_not_negative(self)
 
@@ -231,6 +238,7 @@ class Online:
     form: ObserverForm = field(default_factory=ObserverForm)
     certain_start: bool = False
 
+    @typed_fields
     def __post_init__(self) -> None:
         for name, count in (("process", 6), ("sensors", 4)):
             given = np.asarray(getattr(self, name), dtype=float)
@@ -283,6 +291,7 @@ class Simulator:
     load_sensors: bool = False
     inputs_linear: bool = False
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_not_negative(self)
         if self.inputs_linear and self.late_feedback:

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._common.text import html_text
+from .._common.typed import typed, typed_fields
 from ..effects.scale import ORDINARY_MASS_KG
 from ..errors import InvalidInput
 from ..model import Model
@@ -85,6 +86,7 @@ class Setup:
     name: str = "laboratory"
     pose_gain: float = 0.1
 
+    @typed_fields
     def __post_init__(self) -> None:
         speed = 5.0 if self.first_speed_mps is None else self.first_speed_mps
         if not (0.3 < speed < 150.0 and 20.0 <= self.rate_hz <= 2000.0):
@@ -96,6 +98,7 @@ class Setup:
             raise InvalidInput(f"Setup: pose_gain = {self.pose_gain!r}; give a share from 0 to 1")
 
     @classmethod
+    @typed
     def of(cls, plant: Model, stiffness: float = 50.0) -> Setup:
         """Drive any model, with mass and geometry known and the tyres guessed.
 
@@ -130,6 +133,7 @@ class Setup:
         """Return the published car at its full load, with the corrected loop."""
         return cls.of(_example_plant())
 
+    @typed
     def core(
         self, steer_by: str, speed_mps: float, start: Sequence[float] = (0.0, 0.0)
     ) -> _core.LabLoop:

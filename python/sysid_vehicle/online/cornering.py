@@ -86,6 +86,7 @@ class CorneringRls:
             *static_stiffness(vehicle),
         )  # fmt: skip
 
+    @typed
     def step(
         self, alpha_f_rad: float, alpha_r_rad: float, ay_mps2: float, yaw_acceleration_radps2: float
     ) -> bool:
@@ -101,6 +102,7 @@ class CorneringRls:
         """
         return self._core.step(alpha_f_rad, alpha_r_rad, ay_mps2, yaw_acceleration_radps2)
 
+    @typed
     def run(self, readings: FloatArray) -> FloatArray:
         """Use many samples; columns are the arguments of :meth:`step`.
 
@@ -169,6 +171,7 @@ class CorneringRun(Told):
             f"{len(self.used)} samples"
         )
 
+    @typed
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw both stiffnesses over time onto `ax`."""
         ax = axes_or_new(ax, 9.0, 3.5)

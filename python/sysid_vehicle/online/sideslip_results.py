@@ -129,6 +129,7 @@ class SideslipRun(Told):
         """Lateral speed at the centre of gravity."""
         return self.vx_mps * np.tan(self.beta_rad)
 
+    @typed
     def error(self, true_beta_rad: FloatArray | None = None) -> SideslipError | None:
         """Compare with the truth while the car runs; with that of the log, or None, if none is.
 
@@ -245,6 +246,7 @@ class SideslipRun(Told):
             },
         }
 
+    @typed
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw sideslip with its 2-sigma band, and the truth where the log has it, onto `ax`."""
         ax = axes_or_new(ax, 9.0, 3.5)
@@ -260,6 +262,7 @@ class SideslipRun(Told):
         ax.legend(frameon=False, ncols=3)
         return tidy(ax, xlabel="time [s]", ylabel="sideslip [deg]", title=self.log_name)
 
+    @typed
     def plot_stiffness(self, ax: Axes | None = None) -> Axes:
         """Draw both cornering stiffnesses with their 2-sigma bands onto `ax`."""
         ax = axes_or_new(ax, 9.0, 3.5)

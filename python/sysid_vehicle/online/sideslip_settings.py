@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from .. import _core
 from .._common.files import refuse_unknown
 from .._common.text import html_text, text_table
+from .._common.typed import typed
 from ..effects import length_beyond
 from ..errors import InvalidInput
 from ..estimate.inputs import white_noise_std
@@ -35,6 +36,7 @@ class SideslipSettings(Mapping[str, float]):
         If a name is not known or a value not above 0.
     """
 
+    @typed
     def __init__(self, **changes: float) -> None:
         defaults = _core.sideslip_defaults()
         refuse_unknown(changes, defaults, "sideslip settings")
@@ -51,6 +53,7 @@ class SideslipSettings(Mapping[str, float]):
             )
 
     @classmethod
+    @typed
     def of_car(cls, vehicle: Vehicle, **changes: float) -> SideslipSettings:
         """The defaults with the lengths of a car, and with the speeds that go as their root.
 
@@ -63,6 +66,7 @@ class SideslipSettings(Mapping[str, float]):
         return cls(**{**sizes, **changes})
 
     @classmethod
+    @typed
     def of(cls, log: Log, vehicle: Vehicle | None = None, **changes: float) -> SideslipSettings:
         """Take the noise of the sensors from the fast scatter of the log's channels.
 
@@ -80,6 +84,7 @@ class SideslipSettings(Mapping[str, float]):
         lengths = {name: usual[name] for name in _LENGTHS}
         return cls(**{**noise, **speeds, **lengths, **changes})
 
+    @typed
     def replace(self, **changes: float) -> SideslipSettings:
         """Return a copy with some settings changed."""
         return SideslipSettings(**{**self._values, **changes})

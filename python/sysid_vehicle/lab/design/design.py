@@ -15,17 +15,17 @@ from ..._common.printed import Part, Printed
 from ..._common.progress import doing
 from ..._common.style import AFTER, BEFORE, axes_or_new, tidy
 from ..._common.threads import Workers
-from ...diagnose import DriveLimits
+from ..._common.typed import typed
 from ...effects import length_beyond
 from ...errors import InvalidInput, NumericalError
 from ...manoeuvres import peak_lateral_mps2
 from ...model import Model
-from ...vehicle import AXLES, Vehicle
+from ...vehicle import AXLES
 from ..excitation import Excitation, Weaving
-from ..excitation.weaving import LEAST_MPS
 from ..observer.observed import READINGS
 from ..setup import Setup
 from .information import TYRES
+from .limits import Limits
 from .preview import Preview, preview
 
 if TYPE_CHECKING:
@@ -36,81 +36,6 @@ _REAR_SLIP_SHARE = 1.25
 _MOST_SWING_MPS = 12.0
 _AT_ONCE = 4  # trials around one best, whatever the number of threads
 _FIRST_SPREAD, _LAST_SPREAD = 0.25, 0.05  # of the box, for the trials around the best so far
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What the drive must keep to.
-
-    Parameters
-    ----------
-    slowest_mps, fastest_mps : float
-        Speed.
-    road_width_m : float
-        Width of the strip that the car's centre may use.
-    lateral_mps2 : float
-        Lateral acceleration.
-    slip_share : float
-        Largest slip angle of either axle, in multiples of that at its peak.
-
-    Raises
-    ------
-    InvalidInput
-        If one is not positive, or the fastest speed is not above the slowest.
-    """
-
-    slowest_mps: float = 8.0
-    fastest_mps: float = 45.0
-    road_width_m: float = 40.0
-    lateral_mps2: float = 20.0
-    slip_share: float = 3.0
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not value > 0.0:
-                raise InvalidInput(f"Limits: {name} = {value!r}; give a positive number")
-        if not self.fastest_mps > self.slowest_mps + 2.0:
-            raise InvalidInput(
-                f"Limits: fastest_mps = {self.fastest_mps:g} leaves no room above slowest_mps = "
-                f"{self.slowest_mps:g}; 2 m/s and more are needed"
-            )
-
-    @classmethod
-    def usual(cls, vehicle: Vehicle, **others: float) -> Limits:
-        """Limits that suit a car: what a driver could drive (`DriveLimits.usual`), and more speed.
-
-        Speeds are in proportion to the top speed of a driver's, widths to the length of the car. The
-        lateral acceleration is that of a driver's only where the car would tip over.
-
-        Parameters
-        ----------
-        vehicle : Vehicle
-        **others
-            Limits that are known.
-        """
-        driver = DriveLimits.usual(vehicle)
-        share = driver.speed_mps / DriveLimits.speed_mps
-        tips = driver.lateral_mps2 < DriveLimits.lateral_mps2
-        found = {
-            "slowest_mps": max(share * cls.slowest_mps, LEAST_MPS),
-            "fastest_mps": share * cls.fastest_mps,
-            "road_width_m": length_beyond(vehicle.wheelbase_m) * cls.road_width_m,
-            "lateral_mps2": driver.lateral_mps2 if tips else cls.lateral_mps2,
-        }
-        return cls(**{**found, **others})
-
-    def broken(self, seen: Preview) -> list[tuple[str, float]]:
-        """Name each limit that a drive breaks, and by what share."""
-        t = seen.drive.truth
-        lateral = float(np.abs(t["ay_mps2"]).max())
-        found = [
-            ("speed", self.slowest_mps / max(float(t["vx_mps"].min()), 1e-3)),
-            ("speed", float(t["vx_mps"].max()) / self.fastest_mps),
-            ("road width", seen.road_width_m / self.road_width_m),
-            ("lateral acceleration", lateral / self.lateral_mps2),
-            *((f"{c.axle} slip angle", c.reached / self.slip_share) for c in seen.coverage),
-        ]
-        return [(what, share - 1.0) for what, share in found if share > 1.0]
 
 
 @dataclass(frozen=True)
@@ -184,6 +109,7 @@ class Design(Printed):
     def _parts(self) -> list[Part]:
         return [*self._notes(), *self.preview._parts()]
 
+    @typed
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw how well each trial would tell the least-known coefficient."""
         ax = axes_or_new(ax, 8.0, 3.0)
@@ -199,6 +125,7 @@ class Design(Printed):
         return tidy(ax, xlabel="trial", ylabel="least-known coefficient, std [%]", title="Design")
 
 
+@typed
 def design_excitation(
     setup: Setup | None = None,
     *,

@@ -15,6 +15,7 @@ import numpy as np
 
 from ... import _core
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from ...estimate import MEASURED, NoiseModel
 from ...model import Model
@@ -86,6 +87,7 @@ def parameters_of(drive: ClosedLoop, model: Model) -> FloatArray:
     return p
 
 
+@typed
 def information(
     drive: ClosedLoop,
     model: Model,

@@ -11,6 +11,7 @@ import numpy as np
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
 from ..._common.text import number
+from ..._common.typed import typed
 from ...identify.intervals.estimates import std_of_data
 from ...model import Model
 from ...vehicle import AXLES
@@ -153,6 +154,7 @@ class Preview(Printed):
     def _parts(self) -> list[Part]:
         return [self._title(), Table(self._HEAD, self._rows()), self._notes()]
 
+    @typed
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw how long each slip angle is held; on a second axis the tyre curves as believed."""
         ax = axes_or_new(ax, 8.0, 3.6)
@@ -187,6 +189,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 1.0 else "> 100 %"
 
 
+@typed
 def preview(
     excitation: Excitation,
     setup: Setup | None = None,

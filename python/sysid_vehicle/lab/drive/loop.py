@@ -13,6 +13,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
 from ..._common.text import number
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from ...log import Log
 from ...simulate import RoadDisturbance
@@ -111,6 +112,7 @@ class ClosedLoop(Printed):
             for name in ESTIMATES[:3]
         }
 
+    @typed
     def to_log(self, name: str | None = None) -> Log:
         """Return what the sensors wrote, as a log to estimate and identify from.
 
@@ -166,6 +168,7 @@ class ClosedLoop(Printed):
     def _parts(self) -> list[Part]:
         return [self._title(), Table(("what", "value"), self._rows()), self._verdict()]
 
+    @typed
     def plot(self, ax: Axes | None = None, what: str = "yaw_rate_radps") -> Axes:
         """Draw a quantity as wanted, as driven and as observed.
 
@@ -199,6 +202,7 @@ class ClosedLoop(Printed):
         return tidy(ax, xlabel="time_s", ylabel=what, title=self.excitation.name)
 
 
+@typed
 def run_closed_loop(
     excitation: Excitation,
     setup: Setup | None = None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..._common.style import AFTER, BEFORE, TRUTH, legend_above, new_figure, tidy
+from ..._common.typed import typed
 from .loop import ClosedLoop
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 _PANELS = ("vx_mps", "yaw_rate_radps", "steer_rad", "fx_n")
 
 
+@typed
 def overview(drive: ClosedLoop) -> Figure:
     """Draw references and response, inputs, disturbances, slip angles and limits over time."""
     figure = new_figure(9.0, 12.0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..._common.arguments import check_positive
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed, typed_fields
 from ...manoeuvres import Knots, Manoeuvre
 from ...manoeuvres.curves import Curve
 from ...vehicle import Vehicle
@@ -57,6 +58,7 @@ class Driven(_ByLateral):
     speed: Curve
     lateral: Curve
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_positive(self.label, duration_s=self.duration_s)
 
@@ -65,10 +67,12 @@ class Driven(_ByLateral):
         """Name, also of the log that comes out."""
         return self.label
 
+    @typed
     def speed_mps(self, time_s: FloatArray) -> FloatArray:
         """Wanted speed at these times [m/s]."""
         return as_float64(self.speed(time_s))
 
+    @typed
     def lateral_mps2(self, time_s: FloatArray) -> FloatArray:
         """Wanted lateral acceleration at these times [m/s2]."""
         return as_float64(self.lateral(time_s))
@@ -104,14 +108,17 @@ class OnManoeuvre(_ByLateral):
         """The heading, or the steering angle where the manoeuvre is open loop."""
         return "heading" if self.manoeuvre.tracks_path else "angle"
 
+    @typed
     def speed_mps(self, time_s: FloatArray) -> FloatArray:
         """Wanted speed at these times [m/s]."""
         return as_float64(self.manoeuvre.speed_mps(time_s))
 
+    @typed
     def lateral_mps2(self, time_s: FloatArray) -> FloatArray:
         """Wanted lateral acceleration at these times [m/s2]."""
         return as_float64(self.manoeuvre.lateral_mps2(time_s))
 
+    @typed
     def steer_rad(self, vehicle: Vehicle, time_s: FloatArray) -> FloatArray:
         """Steering angle at these times [rad]."""
         if self.manoeuvre.tracks_path:
@@ -120,6 +127,7 @@ class OnManoeuvre(_ByLateral):
         return as_float64(self.manoeuvre.references(vehicle, rate_hz)[:, 2])
 
 
+@typed
 def speed_ramp(
     from_mps: float = 15.0,
     to_mps: float = 80.0,
@@ -143,6 +151,7 @@ def speed_ramp(
     return Driven("speed_ramp", duration_s, speed, wanted)
 
 
+@typed
 def multi_sine(
     lateral_mps2: float = 6.0,
     speed_mps: float = 30.0,

@@ -10,6 +10,7 @@ import numpy as np
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.style import axes_or_new, tidy
 from ..._common.text import html_text
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from ...vehicle import Vehicle
 
@@ -60,14 +61,17 @@ class Excitation(ABC):
     def speed_mps(self, time_s: FloatArray) -> FloatArray:
         """Wanted speed at these times [m/s]."""
 
+    @typed
     def heading_rad(self, time_s: FloatArray) -> FloatArray:
         """Wanted heading at these times [rad]; zero where something else steers."""
         return np.zeros_like(time_s)
 
+    @typed
     def steer_rad(self, vehicle: Vehicle, time_s: FloatArray) -> FloatArray:
         """Steering angle at these times [rad], where that is what is prescribed."""
         return np.zeros_like(time_s)
 
+    @typed
     def wanted(self, vehicle: Vehicle, rate_hz: float) -> FloatArray:
         """Sample everything that is wanted.
 
@@ -110,6 +114,7 @@ class Excitation(ABC):
             )
         )
 
+    @typed
     def preview(self, setup: Setup | None = None, **options: Any) -> Preview:
         """What it will teach; see :func:`sysid_vehicle.lab.preview`."""
         from ..design.preview import preview
@@ -130,6 +135,7 @@ class Excitation(ABC):
 
     _repr_html_ = html_text
 
+    @typed
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the wanted speed, and the heading on a second axis; or the track."""
         ax = axes_or_new(ax, 8.0, 3.0)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..._common.arguments import check_positive_fields
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput
 
 _ROUNDS = 400
@@ -48,6 +49,7 @@ class MultiSine:
     _phase: FloatArray = field(init=False, repr=False, compare=False)
     _size: float = field(init=False, repr=False, compare=False)
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_positive_fields(self, "peak", "period_s", "from_hz", "to_hz")
         if self.from_hz > self.to_hz:
@@ -82,6 +84,7 @@ class MultiSine:
             value += np.cos(2.0 * np.pi * h * time_s / self.period_s + phase)
         return as_float64(self._size * value)
 
+    @typed
     def integral(self, time_s: FloatArray) -> FloatArray:
         """Integral over time, with mean zero over a period."""
         value = np.zeros_like(time_s)

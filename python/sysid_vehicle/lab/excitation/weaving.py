@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._common.arguments import check_positive_fields
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput
 from .excitation import Excitation
 from .multisine import MultiSine
@@ -52,6 +53,7 @@ class Weaving(Excitation):
     swing_period_s: float = 9.0
     duration_s: float = 60.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_positive_fields(
             self, "lateral_mps2", "from_hz", "to_hz", "period_s", "swing_period_s", "duration_s"
@@ -67,11 +69,13 @@ class Weaving(Excitation):
         """The lateral acceleration."""
         return MultiSine(self.lateral_mps2, self.period_s, self.from_hz, self.to_hz)
 
+    @typed
     def speed_mps(self, time_s: FloatArray) -> FloatArray:
         """Wanted speed at these times [m/s]."""
         swing = self.swing_mps * np.cos(2.0 * np.pi * time_s / self.swing_period_s)
         return as_float64(self.mean_mps - swing)
 
+    @typed
     def heading_rad(self, time_s: FloatArray) -> FloatArray:
         """Wanted heading at these times [rad]."""
         fade = np.clip(np.minimum(time_s, self.duration_s - time_s), 0.0, 1.0)

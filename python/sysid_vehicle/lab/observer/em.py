@@ -14,6 +14,7 @@ from ..._common.printed import Part, Printed, Table
 from ..._common.progress import doing
 from ..._common.style import AFTER, BEFORE, FLOOR, axes_or_new, tidy
 from ..._common.text import number
+from ..._common.typed import typed
 from ...errors import InvalidInput, NumericalError, near_names
 from .observed import READINGS, STATES
 from .observer import Observer, ObserverNoise
@@ -51,6 +52,7 @@ class NoiseStructure:
     correlated: tuple[tuple[str, ...], ...] = ()
     floor: float | Mapping[str, float] = 1e-12
 
+    @typed
     def core(self, names: Sequence[str]) -> tuple[list[int], list[int], FloatArray]:
         """Numbers of scale and block, and the floor, for each of `names`.
 
@@ -175,12 +177,14 @@ class EMResult(Printed):
             },
         }
 
+    @typed
     def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw the log-likelihood over the iterations."""
         ax = axes_or_new(ax, 6.0, 3.0)
         ax.plot(self.log_likelihood, ".-", color=AFTER, lw=1.0, ms=5)
         return tidy(ax, xlabel="iteration", ylabel="log-likelihood")
 
+    @typed
     def plot_noise(self, *, ax: Axes | None = None) -> Axes:
         """Draw the standard deviations learned, as multiples of those before."""
         ax = axes_or_new(ax, 6.0, 3.2)

@@ -12,6 +12,7 @@ from ..._common.arrays import FloatArray
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import AFTER, BEFORE, MEASURED, TRUTH, axes_or_new, tidy
 from ..._common.text import HALF_95, number
+from ..._common.typed import typed
 from ...errors import InvalidInput, near_names
 
 if TYPE_CHECKING:
@@ -102,6 +103,7 @@ class StateEstimate(Printed):
         """Standard deviation of the virtual force sensor, shape (n, 3)."""
         return self.std[:, 3:]
 
+    @typed
     def channel(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Give a state or reading and its standard deviation.
 
@@ -118,6 +120,7 @@ class StateEstimate(Printed):
             return self.reading[:, i], self.reading_std[:, i]
         raise InvalidInput(f"no state or reading {name!r}{near_names(name, _LABELS)}")
 
+    @typed
     def plot(self, channel: str = "xi_y_n", *, ax: Axes | None = None) -> Axes:
         """Draw a state or reading with its 95 % band, and the readings behind it."""
         value, std = self.channel(channel)
@@ -131,6 +134,7 @@ class StateEstimate(Printed):
         ax.legend(loc="upper right", frameon=False)
         return tidy(ax, xlabel="time [s]", ylabel=_LABELS[channel])
 
+    @typed
     def plot_forces(self, *, ax: Axes | None = None) -> Axes:
         """Draw the virtual force sensor: both forces, and the moment per metre, with 95 % bands."""
         ax = axes_or_new(ax, 8.0, 3.5)

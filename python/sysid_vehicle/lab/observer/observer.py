@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from ... import _core
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput, NumericalError
 from ...estimate.inputs import white_noise_std
 from ...vehicle import GRAVITY_MPS2
@@ -70,6 +71,7 @@ class ObserverNoise:
     process: FloatArray
     sensors: FloatArray
 
+    @typed_fields
     def __post_init__(self) -> None:
         object.__setattr__(self, "process", as_float64(self.process))
         object.__setattr__(self, "sensors", as_float64(self.sensors))
@@ -77,11 +79,13 @@ class ObserverNoise:
         _refuse_no_covariance(self.sensors, READINGS, "sensor noise", zero=False)
 
     @classmethod
+    @typed
     def from_variances(cls, process: npt.ArrayLike, sensors: npt.ArrayLike) -> ObserverNoise:
         """Uncorrelated noise of six and four variances."""
         return cls(np.diag(as_float64(process)), np.diag(as_float64(sensors)))
 
     @classmethod
+    @typed
     def first_guess(cls, record: ObserverRecord, car: ObserverCar) -> ObserverNoise:
         """Guess from the fast scatter of the readings and weight alone: a start for learning."""
         smallest = np.array([1e-3, 1e-4, 1e-4, 1e-3])
@@ -139,10 +143,12 @@ class Observer:
     form: ObserverForm = ObserverForm()
     certain_start_mps: float | None = None
 
+    @typed
     def with_noise(self, noise: ObserverNoise) -> Observer:
         """Give the same observer with other covariances."""
         return dataclasses.replace(self, noise=noise)
 
+    @typed
     def filtered(self, record: ObserverRecord) -> StateEstimate:
         """Estimates from the readings up to each sample.
 
@@ -153,10 +159,12 @@ class Observer:
         """
         return self._trace(record, smoothed=False)
 
+    @typed
     def smoothed(self, record: ObserverRecord) -> StateEstimate:
         """Estimates from all readings; raises as `filtered` does."""
         return self._trace(record, smoothed=True)
 
+    @typed
     def log_likelihood(self, record: ObserverRecord) -> float:
         """Of the readings, by one pass of the filter."""
         log = self.core_log(record)
@@ -164,6 +172,7 @@ class Observer:
             record.name, lambda: log.log_likelihood(self.noise.process, self.noise.sensors)
         )
 
+    @typed
     def core_log(self, record: ObserverRecord) -> _core.ObserverLog:
         """Put the record into the core, with the state it starts from."""
         speed = self.certain_start_mps

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput
 from ...log import Log
 from ...vehicle import Vehicle, static_loads
@@ -33,12 +34,14 @@ class ObserverCar:
     lr_m: float
     drag_nspm: float = 0.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m"):
             if not getattr(self, name) > 0.0:
                 raise InvalidInput(f"{name} = {getattr(self, name)} must be a number above zero")
 
     @classmethod
+    @typed
     def of(cls, vehicle: Vehicle, *, drag_nspm: float = 0.0) -> ObserverCar:
         """Take the numbers of a vehicle.
 
@@ -89,6 +92,7 @@ class ObserverRecord:
     name: str = "log"
 
     @classmethod
+    @typed
     def from_arrays(
         cls,
         *,
@@ -140,6 +144,7 @@ class ObserverRecord:
         return cls(rate_hz=float(rate_hz), readings=y, name=name, **inputs)
 
     @classmethod
+    @typed
     def from_log(
         cls, log: Log, car: ObserverCar, stiffness_prad: tuple[float, float]
     ) -> ObserverRecord:
@@ -195,6 +200,7 @@ class ObserverRecord:
             ]
         )
 
+    @typed
     def without(self, *channels: str) -> ObserverRecord:
         """Give the same record with the readings of some channels missing."""
         y = self.readings.copy()

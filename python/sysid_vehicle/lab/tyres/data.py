@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ... import _core
 from ..._common.arguments import check_positive_fields
 from ..._common.arrays import FloatArray, as_float64, filled
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput
 from ...log import Log
 from ...vehicle import Vehicle, static_loads
@@ -51,6 +52,7 @@ class GreyBoxVehicle:
     brake_front_share: float = 0.0
     drive_front_share: float = 0.0
 
+    @typed_fields
     def __post_init__(self) -> None:
         check_positive_fields(
             self, "mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3"
@@ -68,6 +70,7 @@ class GreyBoxVehicle:
                 raise InvalidInput(f"{name} is {getattr(self, name)}; give a share from 0 to 1")
 
     @classmethod
+    @typed
     def of(cls, vehicle: Vehicle, *, mass_tolerance: float = 0.0) -> GreyBoxVehicle:
         """Take what a vehicle file says.
 
@@ -126,6 +129,7 @@ class TyreLog:
     inputs: FloatArray
     name: str = "log"
 
+    @typed_fields
     def __post_init__(self) -> None:
         y, u = as_float64(self.measurements), as_float64(self.inputs)
         object.__setattr__(self, "measurements", y)
@@ -163,6 +167,7 @@ class TyreLog:
                 )
 
     @classmethod
+    @typed
     def of(
         cls,
         step_s: float,
@@ -201,6 +206,7 @@ class TyreLog:
         return cls(step_s, as_float64(measurements), as_float64(np.column_stack([u, f])), name)
 
     @classmethod
+    @typed
     def from_log(cls, log: Log, vehicle: GreyBoxVehicle) -> tuple[TyreLog, ...]:
         """From a driving log: one for each stretch in which the car drives, its inputs known.
 
@@ -260,6 +266,7 @@ class TyreLog:
         y[:, 1] = np.nan
         return TyreLog(self.step_s, y, self.inputs, self.name)
 
+    @typed
     def with_kinematic_sideslip(self, window_s: float = 10.0) -> TyreLog:
         """The same drive with v_y from integrating a_y - v_x r, without what drifts.
 
@@ -274,6 +281,7 @@ class TyreLog:
         y[:, 1] = v_y - drift
         return TyreLog(self.step_s, y, self.inputs, self.name)
 
+    @typed
     def cut(self, first: int, last: int) -> TyreLog:
         """Samples `first` up to, not including, `last`."""
         return TyreLog(

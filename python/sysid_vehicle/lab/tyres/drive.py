@@ -8,6 +8,7 @@ import numpy as np
 
 from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from ..observer.observed import READINGS
 from .data import GreyBoxVehicle, TyreLog
@@ -16,6 +17,7 @@ from .problem import TyreProblem, first_point
 _SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)  # v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]
 
 
+@typed
 def drive_tyres(
     vehicle: GreyBoxVehicle,
     tyres: Mapping[str, float],

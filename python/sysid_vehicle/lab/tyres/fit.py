@@ -13,6 +13,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import AFTER, BEFORE, axes_or_new, tidy
 from ..._common.text import HALF_95, number, within
+from ..._common.typed import typed
 from ...identify.intervals.estimates import Estimate, Estimated
 from ...identify.intervals.profile import Profile
 from ...identify.intervals.quantities import Quantity, parameter, std_of, tyre_quantity
@@ -152,6 +153,7 @@ class TyreFit(Estimated, Printed):
     profiles: tuple[Profile, ...] = ()
     rivals: tuple[Rival, ...] = ()
 
+    @typed
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval: of the profile likelihood, or of the information matrix without one.
 
@@ -175,6 +177,7 @@ class TyreFit(Estimated, Printed):
         """Estimates and combinations as functions of all parameters."""
         return quantities([e.name for e in self.estimates])
 
+    @typed
     def tyre(self, axle: str) -> FloatArray:
         """B, C, D, E of an axle, `front` or `rear`."""
         first = 4 * AXLES.index(axle)
@@ -245,6 +248,7 @@ class TyreFit(Estimated, Printed):
             "rivals": [{"parameters": r.parameters.tolist(), "lost": r.lost} for r in self.rivals],
         }
 
+    @typed
     def curve(self, axle: str, slip_rad: FloatArray | None = None) -> TyreBand:
         """Tyre curve of an axle with its standard error, by the delta method."""
         i = AXLES.index(axle)
@@ -258,6 +262,7 @@ class TyreFit(Estimated, Printed):
         std = np.sqrt(np.maximum(variance, 0.0))
         return TyreBand(axle, slip_rad, friction(slip_rad, bcde), std, self.driven_rad[i])
 
+    @typed
     def plot(self, ax: Axes | None = None, axles: Sequence[str] = AXLES) -> Axes:
         """Draw tyre curves with 95 % bands; dotted beyond the driven slip.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..._common.text import number
+from ..._common.typed import typed
 from ...errors import InvalidInput, near_names
 from ...identify.intervals.profile import LEVEL, Optimum, lost_at
 from .fit import TyreFit
@@ -42,6 +43,7 @@ class HeldValue:
         )
 
 
+@typed
 def hold_value(fit: TyreFit, name: str, value: float) -> HeldValue:
     """Ask whether the data accept a value, such as that of a supplier's data sheet.
 

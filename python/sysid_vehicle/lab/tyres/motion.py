@@ -10,6 +10,7 @@ import scipy
 
 from ... import _core
 from ..._common.arrays import FloatArray, as_float64, filled
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput
 from .data import GreyBoxVehicle, TyreLog
 
@@ -37,6 +38,7 @@ class TyreMotion:
     ay_variance: FloatArray | None = None
     yaw_acc_radps2: FloatArray | None = None
 
+    @typed_fields
     def __post_init__(self) -> None:
         motion = as_float64(self.motion)
         if motion.ndim != 2 or motion.shape[1] != len(_COLUMNS):
@@ -60,6 +62,7 @@ class TyreMotion:
             _finite(name, values)
 
     @classmethod
+    @typed
     def from_log(cls, log: TyreLog, window_s: float = 0.3) -> TyreMotion:
         """From the readings, smoothed by a cubic over a sliding window (Savitzky & Golay, 1964).
 
@@ -80,6 +83,7 @@ class TyreMotion:
         return len(self.motion)
 
     @classmethod
+    @typed
     def joined(cls, motions: Sequence[TyreMotion]) -> TyreMotion:
         """All of them as one; what one of them lacks the whole lacks."""
 
@@ -94,6 +98,7 @@ class TyreMotion:
             together("yaw_acc_radps2"),
         )
 
+    @typed
     def thinned(self, most: int) -> TyreMotion:
         """About `most` samples of it, evenly spread."""
         every = slice(None, None, max(1, self.n // most))
@@ -102,6 +107,7 @@ class TyreMotion:
         )
         return TyreMotion(self.motion[every], self.ay_mps2[every], variance, rate)
 
+    @typed
     def errors(
         self,
         vehicle: GreyBoxVehicle,

@@ -16,6 +16,7 @@ from ..._common.printed import Part, Printed, Table
 from ..._common.progress import doing
 from ..._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
 from ..._common.text import number
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from ..observer.observed import READINGS
 from .data import GreyBoxVehicle, TyreLog
@@ -44,11 +45,13 @@ class IdentifiedCar:
     noise: FloatArray
 
     @classmethod
+    @typed
     def of(cls, fit: TyreFit) -> IdentifiedCar:
         """Take it from a fit."""
         return cls(fit.vehicle, fit.parameters, fit.noise)
 
     @classmethod
+    @typed
     def from_json(cls, path: str | Path) -> IdentifiedCar:
         """Read what `TyreFit.to_dict` was written to.
 
@@ -139,6 +142,7 @@ class Validation(Printed):
             "noise": dict(zip(READINGS, map(float, self.noise), strict=True)),
         }
 
+    @typed
     def plot(self, ax: Axes | None = None, *, reading: str = "vy_mps") -> Axes:
         """Draw a reading, and what was predicted of it.
 
