@@ -61,6 +61,7 @@ class MuSlipCurve:
     kernels: type[_core._Curve] = field(repr=False)
     filter_type: type[_core._CurveFilter] = field(repr=False)
 
+    @typed
     def vector(self, values: npt.ArrayLike, name: str = "values") -> FloatArray:
         """Check parameters and return them as an array.
 
@@ -82,12 +83,14 @@ class MuSlipCurve:
                 raise InvalidInput(f"{name}: {p} = {x:g}; choose {low:g} to {high:g}")
         return found
 
+    @typed
     def points(
         self, slip: npt.ArrayLike, values: npt.ArrayLike
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Friction (n,), its gradient (n, p) and Hessian (n, p, p) in the parameters, all exact."""
         return self.kernels.points(as_float64(np.atleast_1d(slip)), self.vector(values))
 
+    @typed
     def mu(self, slip: npt.ArrayLike, values: npt.ArrayLike) -> FloatArray:
         """Friction at each slip, shape (n,)."""
         return self.points(slip, values)[0]

@@ -75,6 +75,7 @@ class MuSlipData:
             )
 
     @classmethod
+    @typed
     def from_csv(cls, path: str | Path, noise_std: float | None = None) -> MuSlipData:
         """Read the columns `slip` and `mu` of a CSV file; an empty cell of `mu` is no reading.
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ..._common.arrays import FloatArray
 from ..._common.progress import doing
 from ..._common.style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, new_figure, tidy
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from .curve import TWO_PARAMETER, MuSlipCurve
 from .results import MuSlipRun
@@ -47,6 +48,7 @@ class MuSlipFrame:
         True parameters, if there are any.
     """
 
+    @typed
     def __init__(
         self, run: MuSlipRun, ax: Axes | None = None, truth: Sequence[float] | None = None
     ) -> None:
@@ -68,6 +70,7 @@ class MuSlipFrame:
         self.ax.legend(frameon=False, loc="upper right")
         tidy(self.ax, xlabel="slip ratio", ylabel="friction")
 
+    @typed
     def show(self, used: int) -> list[Artist]:
         """Draw the state after `used` readings; 0 is the prior.
 
@@ -94,6 +97,7 @@ class MuSlipFrame:
         return [self._readings, self._now, self._curve, self._peak, self._contour]
 
 
+@typed
 def animate_mu_slip(
     run: MuSlipRun,
     ax: Axes | None = None,
@@ -151,6 +155,7 @@ def save_animation(animation: FuncAnimation, path: str | Path, *, per_second: in
         os.replace(whole, target)
 
 
+@typed
 def draw_mu_slip_convergence(run: MuSlipRun, ax: Axes | None = None) -> Axes:
     """Draw the variances relative to their start, and the correlation, over slip (Figure 1)."""
     ax = axes_or_new(ax, 6.5, 4.0)
@@ -167,6 +172,7 @@ def draw_mu_slip_convergence(run: MuSlipRun, ax: Axes | None = None) -> Axes:
     return tidy(ax, xlabel="slip ratio", ylabel=ylabel, title="Convergence of the covariance")
 
 
+@typed
 def draw_mu_slip_lissajous(
     run: MuSlipRun, ax: Axes | None = None, truth: Sequence[float] | None = None
 ) -> Axes:
@@ -200,6 +206,7 @@ def draw_mu_slip_lissajous(
     return tidy(ax, xlabel="slip ratio", ylabel="friction", title=title)
 
 
+@typed
 def draw_mu_slip_signal(run: MuSlipRun, ax: Axes | None = None) -> Axes:
     """Draw what the filter expects to learn against what it takes for noise (Figure 2)."""
     ax = axes_or_new(ax, 6.5, 4.0)
@@ -212,6 +219,7 @@ def draw_mu_slip_signal(run: MuSlipRun, ax: Axes | None = None) -> Axes:
     return tidy(ax, xlabel="slip ratio", ylabel="variance", title="Signal and noise")
 
 
+@typed
 def draw_mu_slip_observability(
     values: npt.ArrayLike,
     ax: Axes | None = None,
@@ -231,6 +239,7 @@ def draw_mu_slip_observability(
     return tidy(ax, xlabel="slip ratio", title="What a reading tells of each parameter")
 
 
+@typed
 def mu_slip_overview(run: MuSlipRun, truth: Sequence[float] | None = None) -> Figure:
     """Draw the last frame of the run and the three figures that explain it on one sheet."""
     figure = new_figure(11.0, 7.5)

@@ -65,6 +65,7 @@ class MuSlipFilter:
             _drift(curve, drift_std),
         )
 
+    @typed
     def update(self, slip: float, mu: float) -> None:
         """Use one reading; a `mu` of NaN only lets the parameters drift.
 
@@ -120,7 +121,8 @@ def mu_slip_ekf(
         If the filter leaves the range of numbers; the message gives the sample.
     """
     prior = prior or curve.prior
-    noise_std = noise_of(data, curve) * _factor(noise_factor)
+    sensor_std = noise_of(data, curve)
+    noise_std = sensor_std * _factor(noise_factor)
     start = curve.vector(prior.mean, "prior")
     for _ in range(at_least_one("passes", passes)):
         begun = start
@@ -148,6 +150,8 @@ def mu_slip_ekf(
         noise_std**2 + found["pseudo_variance"],
         found["signal_before"],
         found["signal_after"],
+        _drift(curve, drift_std),
+        sensor_std,
     )
 
 

@@ -15,6 +15,7 @@ from ..._common.printed import Told
 from ..._common.progress import doing
 from ..._common.style import FLOOR, axes_or_new, tidy
 from ..._common.text import text_table
+from ..._common.typed import typed
 from ...errors import InvalidInput
 from .compare import compare_mu_slip
 from .curve import TWO_PARAMETER, MuSlipCurve
@@ -100,6 +101,7 @@ class MuSlipNoiseStudy(Told):
         ]
         return "\n".join([self._head(), text_table(head, rows), *notes])
 
+    @typed
     def plot(self, ax: Axes | None = None, parameter: str = "mu_peak") -> Axes:
         """Draw the rms error of the peak friction, or of its slip, over signal-to-noise.
 

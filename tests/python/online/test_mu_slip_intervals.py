@@ -1,0 +1,54 @@
+"""Intervals of the peak hold it, or the estimate says that they do not."""
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import online
+
+SETS = 300
+
+
+def drawn(low: float, high: float, seed: int) -> list[tuple[float, online.MuSlipData]]:
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(SETS):
+        peak, at, noise = rng.uniform(low, high), rng.uniform(0.05, 0.2), rng.uniform(0.005, 0.04)
+        found.append((peak, online.simulate_mu_slip((peak, at), noise_std=noise, seed=rng)))
+    return found
+
+
+SURFACES = {"dry": (0.8, 1.1), "wet": (0.4, 0.7), "slippery": (0.1, 0.3)}
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_the_smoother_holds_the_peak_on_any_surface(surface: str) -> None:
+    holds = []
+    for peak, data in drawn(*SURFACES[surface], 861403):
+        e = online.mu_slip_smooth(data).estimate
+        holds.append(abs(e.values[0] - peak) < 1.96 * e.std[0])
+    assert 0.92 <= np.mean(holds) <= 0.98
+
+
+@pytest.mark.parametrize("settings", [{}, {"noise_factor": 1.0}], ids=["published", "own noise"])
+@pytest.mark.parametrize("surface", SURFACES)
+def test_the_filter_says_where_its_interval_does_not_hold(
+    surface: str, settings: dict[str, float]
+) -> None:
+    """Linearised around the prior, it is pulled towards nothing on ice by more than it knows."""
+    silent, told = [], []
+    for peak, data in drawn(*SURFACES[surface], 861404):
+        e = online.mu_slip_ekf(data, noise_factor=settings.get("noise_factor", 3.0)).estimate
+        holds = abs(e.values[0] - peak) < 1.96 * e.std[0]
+        said = any(n.startswith("mu_peak: the interval does not hold") for n in e.notes)
+        (told if said else silent).append(holds)
+    if silent:
+        assert np.mean(silent) >= 0.92
+    if surface == "slippery":
+        assert told and np.mean(told) < 0.9
+
+
+def test_a_comparison_says_it_too() -> None:
+    ice = online.simulate_mu_slip((0.11, 0.05), noise_std=0.02, seed=861405)
+    rows = str(online.compare_mu_slip(ice)).splitlines()
+    assert "too narrow" in next(r for r in rows if r.strip().startswith("EKF "))
+    assert "too narrow" not in next(r for r in rows if "smoother" in r)
