@@ -62,6 +62,8 @@ def scales(
     columns: Mapping[str, FloatArray],
     stated: Mapping[str, float],
     wheelbase_m: float | None = None,
+    *,
+    of_full_lock: bool = False,
 ) -> Scales:
     """Find factors and signs of the channels of a drive.
 
@@ -75,6 +77,8 @@ def scales(
         Factors of those whose unit is known.
     wheelbase_m : float, optional
         Of the car, where it is known.
+    of_full_lock : bool
+        Whether the steering is a share of its largest angle.
     """
     drive = _Windows(time_s, columns)
     notes: dict[str, str] = {}
@@ -88,7 +92,9 @@ def scales(
     _signs(drive, factors, notes)
     if "steer_rad" in columns:
         unit = stated.get("steer_rad")
-        factors["steer_rad"] = _steer(drive, factors, unit, wheelbase_m, notes)
+        factors["steer_rad"] = _steer(
+            drive, factors, unit, wheelbase_m, notes, of_full_lock=of_full_lock
+        )
     if drive.has("fx_n", "ax_mps2"):
         factors["fx_n"] = _force(drive, factors, stated.get("fx_n"), notes)
     return Scales(factors, notes, swapped)
@@ -328,6 +334,8 @@ def _steer(
     stated: float | None,
     wheelbase_m: float | None,
     notes: dict[str, str],
+    *,
+    of_full_lock: bool,
 ) -> float:
     """The factor to road wheels: by the car's wheelbase, or by the one that would answer so."""
     own = (1.0, _DEG) if stated is None else (abs(stated),)
@@ -355,6 +363,14 @@ def _steer(
             wheelbase_m = None
         else:
             times, std, off = times * asked[0], _LAW_STD, asked[1]
+    if of_full_lock:
+        factor = float(f"{sign / times:.3g}")
+        notes["steer_rad"] = (
+            f"a share of the full angle; the factor is what the car's curves ask for, within "
+            f"{100.0 * (math.exp(std) - 1.0):.0f} %: put in the largest angle of the road wheels "
+            f"[rad] over the reading there"
+        )
+        return factor
     ways = [(f, 1.0, std) for f in own]
     ways += [(f, _RATIO, math.hypot(std, _RATIO_STD)) for f in own]
     factor, ratio, _ = min(ways, key=lambda way: abs(math.log(times * way[0] / way[1])) / way[2])

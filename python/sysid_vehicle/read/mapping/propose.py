@@ -291,7 +291,9 @@ class _Guess:
             return None
         # The sign and the gear of the steering are no matter of its unit: they are always sought.
         known = {c: f for c, f in self.stated.items() if c in drive[1]}
-        found = scales(*drive, known, wheelbase_m)
+        steer = self.first.get("steer_rad")
+        share = steer is not None and factor_to("%", self.view.said(steer, "%")) is not None
+        found = scales(*drive, known, wheelbase_m, of_full_lock=share)
         if found.swapped:
             first = self.first
             first["ax_mps2"], first["ay_mps2"] = first["ay_mps2"], first["ax_mps2"]
