@@ -13,7 +13,7 @@ from ..model import Model
 from ..vehicle import AXLES, Vehicle
 from .fmu import fmu_bytes
 from .languages import casadi_function, cpp_text, python_text
-from .tyres import tir_text
+from .tyres import left_out_of_tir, tir_text
 from .vehicle_file import vehicle_and_rest
 
 __all__ = [
@@ -43,7 +43,7 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
         exchange and co-simulation, compiled for this platform, with its source. ``.tir``: property
         files of MF 5.2, one for each axle, ``_front`` and ``_rear`` added to the name. ``.toml``: a
         vehicle file with the tyres and the yaw inertia of the model, and with the numbers that its
-        effects changed, such as mass, centre of gravity or drag. Effects for which the file has no
+        effects changed, such as mass, centre of gravity or drag. Effects for which a file has no
         place are named in a warning.
 
     Returns
@@ -66,6 +66,11 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
         return (path,)
     if suffix == ".tir":
         files = {path.with_stem(f"{path.stem}_{a}"): tir_text(model, a) for a in AXLES}
+        if left := left_out_of_tir(model):
+            warn(
+                f"{path}: the file of a tyre has no place for effects ({', '.join(left)}); export "
+                f"the car too, as .toml, .py, .hpp or .fmu"
+            )
     elif suffix == ".py":
         files = {path: python_text(model)}
     elif suffix in (".hpp", ".h"):

@@ -11,6 +11,11 @@ _SENSITIVITY = "tyre_load_sensitivity.sensitivity"
 _SCALED = ("LFZO", "LCY", "LMUY", "LEY", "LKY", "LHY", "LVY", "LGAY")
 
 
+def left_out_of_tir(model: Model) -> list[str]:
+    """Effects of a model for which the property file of a tyre has no place."""
+    return [e for e in model.effects if e != "tyre_load_sensitivity"]
+
+
 def tir_text(model: Model, axle: str) -> str:
     """Return the property file of a tyre of an axle, ``front`` or ``rear``.
 
@@ -49,7 +54,7 @@ def tir_text(model: Model, axle: str) -> str:
     }
     rows = "\n".join(f"{name:<24s}= {value!r}" for name, value in coefficients.items())
     scales = "\n".join(f"{name:<24s}= 1.0" for name in _SCALED)
-    left = ", ".join(e for e in model.effects if e != "tyre_load_sensitivity") or "none"
+    left = ", ".join(left_out_of_tir(model)) or "none"
     return f"""$ {" ".join(car.name.split())}, {axle} tyre: pure lateral slip as it was identified.
 $ No part of the identified model, and left to fill in: longitudinal and combined slip, aligning
 $ moment, camber, radius. Effects of the model that are not in this file: {left}.

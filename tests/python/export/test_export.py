@@ -317,6 +317,11 @@ class TestTyres:
         assert [f.name for f in files] == ["tyre_front.tir", "tyre_rear.tir"]
         assert files[1].read_text("utf-8") == tir_text(truth, "rear")
 
+    def test_what_is_left_out_is_told(self, tmp_path: Path, truth: sv.Model) -> None:
+        model = typical(truth, "tyre_load_sensitivity", "mass", "tyre_relaxation")
+        with pytest.warns(SysidWarning, match=r"no place for effects \(mass, tyre_relaxation\)"):
+            sv.export(model, tmp_path / "tyre.tir")
+
     def test_friction_that_rises_with_load(self, truth: sv.Model) -> None:
         model = truth.add("tyre_load_sensitivity").with_values(
             {"tyre_load_sensitivity.sensitivity": -0.1}
