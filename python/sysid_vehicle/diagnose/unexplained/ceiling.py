@@ -3,9 +3,9 @@
 A flexible regression of the missing side force and yaw moment on what the driver does: steering,
 speed and longitudinal acceleration, and their history. Measured lateral motion is no regressor: it
 holds the missing force itself. Of errors of the speed ahead, the speed is none from where the
-prediction begins: it holds the error, and at constant speed it is little else. The regression is fitted to the training data and judged on
-validation data, so that what it explains there is a lower bound of what is explainable; the rest is
-disturbance, noise, or hidden from the inputs.
+prediction begins: it holds the error, and at constant speed it is little else. The regression is
+fitted to the training data and judged on validation data, so that what it explains there is a lower
+bound of what is explainable; the rest is disturbance, noise, or hidden from the inputs.
 """
 
 from __future__ import annotations
@@ -170,9 +170,7 @@ class Inputs:
     other: FloatArray
 
     @classmethod
-    def of(
-        cls, fit: Fit, train: Driving, other: Driving, *, speed_until_s: float = 0.0
-    ) -> Inputs:
+    def of(cls, fit: Fit, train: Driving, other: Driving, *, speed_until_s: float = 0.0) -> Inputs:
         """Histories of steering, speed and longitudinal acceleration.
 
         Parameters
