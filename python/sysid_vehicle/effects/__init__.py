@@ -2,13 +2,12 @@
 
 from .catalogue import (
     Effect,
-    OwnState,
-    Parameter,
     base_parameters,
     catalogue,
     channels_in_use,
     effect,
 )
+from .parts import OwnState, Parameter
 from .plugins import Plugin, installed_effects
 from .scale import in_car, length_beyond, matters_in
 from .user import define_effect, forget_effect, load_effects, parameter, state

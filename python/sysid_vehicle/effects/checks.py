@@ -13,8 +13,9 @@ import numpy as np
 from .. import _core
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput
-from .catalogue import Parameter, catalogue
+from .catalogue import catalogue
 from .formula import EVERYTHING, SIGNALS, TARGETS, evaluate
+from .parts import Parameter
 
 Function = Callable[[Any, Any], Any]
 

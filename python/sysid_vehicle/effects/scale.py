@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from .catalogue import Effect, Parameter, catalogue
+from .catalogue import Effect, catalogue
+from .parts import Parameter
 
 ORDINARY_WHEELBASE_M = (2.0, 3.5)
 ORDINARY_MASS_KG = (700.0, 3000.0)

@@ -12,9 +12,10 @@ from .._common.arguments import expect
 from .._common.typed import typed
 from ..errors import InvalidInput
 from . import plugins
-from .catalogue import Effect, OwnState, Parameter, catalogue, effect, forget, register
+from .catalogue import Effect, catalogue, effect, forget, register
 from .checks import Function, State, check_names, checked
 from .formula import EVERYTHING, OUTSET, SIGNALS, TARGETS, Formula, trace
+from .parts import OwnState, Parameter
 from .slope import decay_of
 
 _MOVES = {

@@ -1,4 +1,4 @@
-"""Every public function and method of the laboratory and the online estimators names bad arguments."""
+"""Public functions and methods of the laboratory and the online estimators name bad arguments."""
 
 import dataclasses
 import inspect

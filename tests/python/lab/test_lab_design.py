@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import model_cars
 import numpy as np
 import pytest
 
-import model_cars
 from sysid_vehicle import (
     DriveLimits,
     InvalidInput,
