@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .._common.files import write_text
+from .._common.files import read_text, write_text
 from .._common.progress import note
-from ..errors import warn
+from ..errors import InvalidInput, warn
 from ..log import Log
 from ..read import ChannelMap, Proposal, propose_channels, read_log
 from ..vehicle import Vehicle
@@ -69,10 +69,22 @@ def read_logs(
 
 
 def written_map(log: Path, to: Path | None, dbc: Path | None, vehicle: Vehicle | None) -> Proposal:
-    """Propose the channel map of a log, write it, and tell what it lacks."""
+    """Propose the channel map of a log, write it, and tell what it lacks.
+
+    Raises
+    ------
+    InvalidInput
+        If another file is there already: somebody may have edited it.
+    """
     found = propose_channels(log, dbc=dbc, vehicle=vehicle)
     if to is not None:
-        write_text(to, found.to_toml())
+        text = found.to_toml()
+        if to.is_file() and to.stat().st_size > 0 and read_text(to) != text:
+            raise InvalidInput(
+                f"{to}: is there already, and is not what would be written; read it with "
+                "--channels, remove it, or name another file"
+            )
+        write_text(to, text)
         print(f"Channel map: {to}", file=sys.stderr)
     for name in found.missing:
         warn(f"{name}: no column was found for it; name it in the channel map")

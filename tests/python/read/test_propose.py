@@ -330,6 +330,13 @@ def test_on_the_command_line(
     )
     assert main([*run, "--channels", str(target)]) == 2
     assert "--map, --channels: give one" in capsys.readouterr().err
+    assert main(run) == 0  # what is written is what is there
+    edited = again.read_text("utf-8") + "# by hand\n"
+    again.write_text(edited, "utf-8")
+    capsys.readouterr()
+    assert main(run) == 2
+    assert "read it with --channels" in capsys.readouterr().err
+    assert again.read_text("utf-8") == edited
     assert main(["map", str(tmp_path / "run.csv"), "-o", str(tmp_path / "run.csv")]) == 2
     assert "is also an input" in capsys.readouterr().err
 

@@ -297,7 +297,7 @@ def _block_numbers(driving: Driving) -> Whole:
     return np.searchsorted(starts, np.arange(driving.samples), side="right") - 1
 
 
-def _features(fit: Fit, driving: Driving, speed_until_s: float) -> FloatArray:
+def _features(fit: Fit, driving: Driving, speed_until_s: float = 0.0) -> FloatArray:
     """Regressors, (samples, n): polynomials of the inputs now and some time ago."""
     car = fit.model.vehicle
     steer, v = driving.channel("steer_rad"), driving.channel("vx_mps")
