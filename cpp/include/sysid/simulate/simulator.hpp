@@ -29,8 +29,8 @@ struct Drive {
     std::vector<double> inputs;   // samples x (steer, force)
     std::vector<double> states;   // samples x kModelStates
     std::vector<double> outputs;  // samples x kChannels, free of noise
-    std::size_t lost_at =
-        0;  // sample at which the car spun, stopped or went too far; samples if not
+    /// Sample at which the car spun, stopped or went too far; samples if it did not.
+    std::size_t lost_at = 0;
 };
 
 /// `disturbance`: samples x kExternals. The drive ends where the car is lost, or farther than
