@@ -57,9 +57,10 @@ py::list base_parameters() {
 
 /// Whether an effect changes numbers of the car itself: it acts at the stage `vehicle`.
 template <class E>
-constexpr bool kChangesCar = !std::is_same_v<
-    decltype(E::vehicle(std::declval<const double*>(), std::declval<Workings<double>&>())),
-    Inactive>;
+constexpr bool kChangesCar =
+    !std::is_same_v<decltype(E::vehicle(std::declval<const double*>(),
+                                        std::declval<Workings<double>&>())),
+                    Inactive>;
 
 template <std::size_t... I>
 constexpr std::array<bool, kEffectCount> collect_changes_car(std::index_sequence<I...> /*unused*/) {
