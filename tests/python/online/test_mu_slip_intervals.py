@@ -39,8 +39,7 @@ def test_the_filter_says_where_its_interval_does_not_hold(
     for peak, data in drawn(*SURFACES[surface], 861404):
         e = online.mu_slip_ekf(data, noise_factor=settings.get("noise_factor", 3.0)).estimate
         holds = abs(e.values[0] - peak) < 1.96 * e.std[0]
-        said = any(n.startswith("mu_peak: the interval does not hold") for n in e.notes)
-        (told if said else silent).append(holds)
+        (told if "mu_peak" in e.too_narrow else silent).append(holds)
     if silent:
         assert np.mean(silent) >= 0.92
     if surface == "slippery":
@@ -48,8 +47,24 @@ def test_the_filter_says_where_its_interval_does_not_hold(
         assert np.mean(told) < 0.9
 
 
-def test_a_comparison_says_it_too() -> None:
-    ice = online.simulate_mu_slip((0.11, 0.05), noise_std=0.02, seed=861405)
-    rows = str(online.compare_mu_slip(ice)).splitlines()
-    assert "too narrow" in next(r for r in rows if r.strip().startswith("EKF "))
-    assert "too narrow" not in next(r for r in rows if "smoother" in r)
+def test_a_comparison_marks_what_an_estimate_says_of_itself() -> None:
+    seen = set()
+    for _, data in drawn(*SURFACES["slippery"], 861405)[:30]:
+        compared = online.compare_mu_slip(data)
+        rows = str(compared).splitlines()
+        for e in compared.estimates:
+            row = next(r for r in rows if r.strip().startswith(f"{e.method}  "))
+            assert row.count("too narrow") == len(e.too_narrow)
+            for name in e.too_narrow:
+                assert any(note.startswith(f"{name}: the interval") for note in e.notes)
+            seen.add(bool(e.too_narrow))
+    assert seen == {False, True}
+
+
+def test_a_parameter_at_its_bound_is_named() -> None:
+    data = online.simulate_mu_slip((0.9, 0.1), noise_std=0.01, seed=861406)
+    found = online.mu_slip_fit(data, bounds=((0.1, 0.01), (0.8, 0.5)))
+    assert found.at_bound == ("mu_peak",)
+    assert found.cell(0) == "0.80000 at its bound"
+    assert "mu_peak rests at its bound 0.8" in found.notes
+    assert "bound" not in found.cell(1)

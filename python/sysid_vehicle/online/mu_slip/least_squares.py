@@ -14,7 +14,7 @@ from ...errors import InvalidInput
 from ...rules import USUAL
 from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
 from .data import MuSlipData, at_least_one, check_noise, check_values
-from .results import MuSlipEstimate, cautions
+from .results import MuSlipEstimate, cautions, resting
 
 _FEWEST = 20  # readings that the normal distribution of the ratio takes
 
@@ -69,7 +69,8 @@ def mu_slip_fit(
     variance = found["sum_of_squares"] / freedom if data.noise_std is None else data.noise_std**2
     notes = [] if found["converged"] else [f"stopped after {counted(found['iterations'])}"]
     values = found["mean"]
-    notes += cautions(curve, data, values, low, high)
+    at_bound = resting(curve, values, low, high)
+    notes += cautions(curve, data, values, at_bound)
     if corrected:
         values = values - variance * found["bias"]
         outside = (values < low) | (values > high)
@@ -85,6 +86,7 @@ def mu_slip_fit(
         values,
         variance * found["covariance"],
         tuple(notes),
+        at_bound,
     )
 
 

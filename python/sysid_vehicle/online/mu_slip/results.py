@@ -19,8 +19,6 @@ from .data import MuSlipData
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_AT_BOUND = "rests at its bound"
-_NOT_HELD = ": the interval does not hold"
 _ROUNDS = 50  # of the smoother
 
 
@@ -40,6 +38,8 @@ class MuSlipEstimate(Told):
         As the estimator believes it.
     notes : tuple of str
         What the reader should know before using the values.
+    at_bound, too_narrow : tuple of str
+        Parameters that rest at a bound, and those whose interval does not hold.
     """
 
     method: str
@@ -47,6 +47,8 @@ class MuSlipEstimate(Told):
     values: FloatArray
     covariance: FloatArray
     notes: tuple[str, ...] = ()
+    at_bound: tuple[str, ...] = ()
+    too_narrow: tuple[str, ...] = ()
 
     @property
     def std(self) -> FloatArray:
@@ -57,12 +59,12 @@ class MuSlipEstimate(Told):
     def cell(self, i: int) -> str:
         """A value with its standard deviation, or why that says nothing."""
         kernels, value, std = self.curve.kernels, self.values[i], float(self.std[i])
-        if f"{self.curve.parameters[i]} {_AT_BOUND}" in " ".join(self.notes):
+        name = self.curve.parameters[i]
+        if name in self.at_bound:
             return f"{value:.5f} at its bound"
         if not std < kernels.UPPER[i] - kernels.LOWER[i]:
             return f"{value:.5f} not determined"
-        held = f"{self.curve.parameters[i]}{_NOT_HELD}" not in " ".join(self.notes)
-        return f"{value:.5f} ± {std:.5f}{'' if held else ', too narrow'}"
+        return f"{value:.5f} ± {std:.5f}{', too narrow' if name in self.too_narrow else ''}"
 
     @typed
     def band(self, slip: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -97,14 +99,22 @@ class MuSlipEstimate(Told):
         return tidy(ax, xlabel="slip ratio", ylabel="friction", title=self.method)
 
 
+def resting(
+    curve: MuSlipCurve, values: FloatArray, low: FloatArray, high: FloatArray
+) -> tuple[str, ...]:
+    """Parameters that rest at a bound."""
+    ends = zip(curve.parameters, values, low, high, strict=True)
+    return tuple(name for name, x, lowest, highest in ends if x in (lowest, highest))
+
+
 def cautions(
-    curve: MuSlipCurve, data: MuSlipData, values: FloatArray, low: FloatArray, high: FloatArray
+    curve: MuSlipCurve, data: MuSlipData, values: FloatArray, at_bound: tuple[str, ...]
 ) -> tuple[str, ...]:
     """Say where values are not what the readings alone tell."""
     notes = [
-        f"{name} {_AT_BOUND} {x:g}"
-        for name, x, lowest, highest in zip(curve.parameters, values, low, high, strict=True)
-        if x in (lowest, highest)
+        f"{name} rests at its bound {x:g}"
+        for name, x in zip(curve.parameters, values, strict=True)
+        if name in at_bound
     ]
     largest = np.abs(data.slip[np.isfinite(data.mu)]).max()
     if largest < values[1]:
@@ -159,12 +169,15 @@ class MuSlipRun(Told):
     def estimate(self) -> MuSlipEstimate:
         """After the last reading; a note says where its interval does not hold."""
         kernels, values = self.curve.kernels, self.mean[-1]
-        notes = cautions(self.curve, self.data, values, kernels.LOWER, kernels.UPPER)
-        notes += self._bent()
-        return MuSlipEstimate(self.method, self.curve, values, self.covariance[-1], notes)
+        at_bound = resting(self.curve, values, kernels.LOWER, kernels.UPPER)
+        bent = self._bent()
+        notes = (*cautions(self.curve, self.data, values, at_bound), *bent.values())
+        return MuSlipEstimate(
+            self.method, self.curve, values, self.covariance[-1], notes, at_bound, tuple(bent)
+        )
 
-    def _bent(self) -> tuple[str, ...]:
-        """Parameters whose interval does not hold that of the smoother.
+    def _bent(self) -> dict[str, str]:
+        """Parameters whose interval does not hold that of the smoother, with what to say of each.
 
         A filter keeps what it made of the first readings by a curve that is straight around the
         prior: far from there the peak is pulled towards nothing, by more than its standard
@@ -182,18 +195,18 @@ class MuSlipRun(Told):
                 _ROUNDS,
             )
         except NumericalError:
-            return ()
+            return {}
         apart = found["mean"][-1] - self.mean[-1]
         own, other = (np.sqrt(np.diag(c[-1])) for c in (self.covariance, found["covariance"]))
         beyond = np.abs(apart) + HALF_95 * other > HALF_95 * own
-        return tuple(
-            f"{name}{_NOT_HELD} that of the smoother, {mean:.4g} +- {std:.2g}: the "
-            f"curve bends too much between the prior and here; use mu_slip_smooth"
+        return {
+            name: f"{name}: the interval does not hold that of the smoother, {mean:.4g} +- "
+            f"{std:.2g}: the curve bends too much between the prior and here; use mu_slip_smooth"
             for name, mean, std, far in zip(
                 self.curve.parameters, found["mean"][-1], other, beyond, strict=True
             )
             if far and found["converged"]
-        )
+        }
 
     def __str__(self) -> str:
         return str(self.estimate)
@@ -224,10 +237,13 @@ class MuSlipSmoothed(Told):
     def estimate(self) -> MuSlipEstimate:
         """At the last reading."""
         kernels, values = self.curve.kernels, self.mean[-1]
-        notes = cautions(self.curve, self.data, values, kernels.LOWER, kernels.UPPER)
+        at_bound = resting(self.curve, values, kernels.LOWER, kernels.UPPER)
+        notes = cautions(self.curve, self.data, values, at_bound)
         if not self.converged:
             notes = (f"not at rest after {self.rounds} rounds", *notes)
-        return MuSlipEstimate("iterated smoother", self.curve, values, self.covariance[-1], notes)
+        return MuSlipEstimate(
+            "iterated smoother", self.curve, values, self.covariance[-1], notes, at_bound
+        )
 
     def __str__(self) -> str:
         return str(self.estimate)
