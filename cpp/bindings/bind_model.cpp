@@ -70,18 +70,7 @@ constexpr auto kEffectsChangeCar = collect_changes_car(std::make_index_sequence<
 
 /// The numbers of the car as its effects make them, by their names in a vehicle file.
 py::dict car_with_effects(const SingleTrack& model, const Array& p) {
-    const double* values = vector(p, kParameterCount, "parameters");
-    Workings<double> w{};
-    w.m = model.car.mass_kg;
-    w.I_z = values[kYawInertia];
-    w.l_f = model.car.lf_m;
-    w.l_r = model.car.lr_m;
-    w.h = model.car.cg_height_m;
-    w.drag_area = model.car.drag_area_m2;
-    w.brake_front = model.car.brake_front_share;
-    w.drive_front = model.car.drive_front_share;
-    for_each_active(model.effects, values + kBaseParameterCount,
-                    [&](auto e, const double* own, std::size_t) { return e.vehicle(own, w); });
+    const Workings<double> w = model.car_with_effects(vector(p, kParameterCount, "parameters"));
     py::dict d;
     d["mass_kg"] = w.m;
     d["yaw_inertia_kgm2"] = w.I_z;

@@ -81,6 +81,14 @@ struct SingleTrackOf {
     template <class S, class T>
     void sense(const Workings<S>& w, const T* p, const S* aux, S* y) const;
 
+    /// The car as parameters and effects make it; nothing beyond its own numbers is filled in.
+    Workings<double> car_with_effects(const double* p) const {
+        Workings<double> w{};
+        make_car(w, p,
+                 [&](auto&& visit) { for_each_active(effects, p + kBaseParameterCount, visit); });
+        return w;
+    }
+
     /// Fastest rate [1/s] of the motion, for choosing integration steps. Inputs that jump at every
     /// sample excite it at every sample: it counts three times.
     double fastest_rate(const double* p, double v_x) const {
@@ -140,7 +148,7 @@ struct SingleTrackOf {
             }
         };
         part("car");
-        each([&](auto e, const T* own, At) { return e.vehicle(own, w); });
+        make_car(w, p, each);
         part("wheel force");
         // Backwards: what the sensors did last to the acceleration is undone first.
         for_each_active_backwards(effects, q,
@@ -178,17 +186,22 @@ struct SingleTrackOf {
         user_states(user, q, w, lags.from(kCatalogueStates));
     }
 
-    template <class S, class T>
-    void begin(Workings<S>& w, const S* motion, const InputFor<S>& u, const T* p) const {
+    template <class S, class T, class Each>
+    void make_car(Workings<S>& w, const T* p, const Each& each) const {
         w.m = S(car.mass_kg);
         w.I_z = S(p[kYawInertia]);
         w.l_f = S(car.lf_m);
         w.l_r = S(car.lr_m);
         w.h = S(car.cg_height_m);
-        w.rho = car.air_density_kgpm3;
         w.drag_area = S(car.drag_area_m2);
         w.brake_front = S(car.brake_front_share);
         w.drive_front = S(car.drive_front_share);
+        each([&](auto e, const T* own, std::size_t) { return e.vehicle(own, w); });
+    }
+
+    template <class S, class T>
+    void begin(Workings<S>& w, const S* motion, const InputFor<S>& u, const T* p) const {
+        w.rho = car.air_density_kgpm3;
         w.B_f = S(p[kBFront]);
         w.B_r = S(p[kBRear]);
         w.mu_peak_f = S(p[kDFront]);
