@@ -185,6 +185,28 @@ TEST(SingleTrack, ReadsBackTheMeasuredAccelerationWhateverTheSensorErrors) {
     EXPECT_NEAR(e.y[kAx], -3.0, 1e-13);
 }
 
+TEST(SingleTrack, AnAccelerometerToTheLeftReadsWhatItMeasured) {
+    // The yaw acceleration of which its reading consists depends on the force that is found. It
+    // brakes: where the force changes its sign it goes to the other axle, and none may fit.
+    std::mt19937 generator(7);
+    std::uniform_real_distribution<double> part(-1.0, 1.0);
+    Parameters p = plain_parameters();
+    p[parameter_of("imu_lever_arm", 1)] = 0.4;
+    const SingleTrack model{saloon(), mask_of({"imu_lever_arm"}), false};
+    double turning = 0.0;
+    for (int n = 0; n < 500; ++n) {
+        const double vx = 22.0 + 14.0 * part(generator);
+        const ModelState<double> motion{vx, 0.03 * vx * part(generator), 0.4 * part(generator)};
+        const Input u{0.08 * part(generator), -6.0 + 2.0 * part(generator)};
+        const auto e = evaluate(model, motion, u, p);
+        EXPECT_NEAR(e.y[kAx], u.longitudinal, 1e-9);
+        turning = std::max(turning, std::abs(e.rate[2]));
+    }
+    EXPECT_GT(turning, 5.0);
+    const auto straight = evaluate(model, {25.0}, {0.0, -3.0}, p);
+    EXPECT_EQ(straight.y[kAx], -3.0);
+}
+
 TEST(SingleTrack, BackwardsDragPushesForwards) {
     const SingleTrack model{saloon()};
     EXPECT_LT(evaluate(model, {20.0}, {}, plain_parameters()).w.a_x, 0.0);
