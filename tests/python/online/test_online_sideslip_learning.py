@@ -80,12 +80,13 @@ def test_the_band_does_not_answer_for_noise_of_the_measured_sideslip(vehicle, lo
 
 
 def test_a_calibration_does_not_learn_the_noise_of_the_measured_sideslip(vehicle, log, noisy):
-    found = calibrate_sideslip(vehicle, noisy.between(0.0, 20.0), runs=40)
-    rest = log.between(20.0, 40.0)
+    found = calibrate_sideslip(vehicle, noisy.between(0.0, 8.0), runs=20)
+    rest = log.between(20.0, 30.0)
     before = estimate_sideslip(vehicle, rest, settings=found.before.settings)
     after = estimate_sideslip(vehicle, rest, settings=found.settings)
+    assert found.score_after > found.score_before
     assert after.error().rms_deg < 1.2 * before.error().rms_deg
-    assert np.mean(after.beta_std_rad) < 1.2 * np.mean(before.beta_std_rad)
+    assert np.mean(after.beta_std_rad) < 1.05 * np.mean(before.beta_std_rad)  # else 1.18
 
 
 def test_a_drive_without_sideslip_teaches_nothing(vehicle, log):

@@ -205,15 +205,19 @@ def _force(m: Motion, usable: np.ndarray) -> list[Contradiction]:
 def _steer(motion: Motion, usable: np.ndarray) -> list[Contradiction]:
     if not several_frequencies(motion):
         return []
-    lag = steering_lag(motion, usable)
+    least = _MIN_GAIN["steer_rad"]
+    lag = steering_lag(motion, usable, lambda found: _enough(found, least))
     # A car may answer late, and then its steering angle seems early; no car answers ahead of it.
-    told = _told(lag, _STEER_LATE_S, _STEER_EARLY_S, _MIN_GAIN["steer_rad"])
+    told = _told(lag, _STEER_LATE_S, _STEER_EARLY_S, least)
     return [_note("steer_rad", "yaw_rate_radps and ay_mps2", lag)] if told else []
 
 
 def _told(lag: Lag, late_s: float, early_s: float, least: float = _MIN_GAIN_ELSE) -> bool:
-    enough = lag.gain > least and lag.evidence > _MIN_EVIDENCE
-    return enough and lag.beyond(late_s, early_s)
+    return _enough(lag, least) and lag.beyond(late_s, early_s)
+
+
+def _enough(lag: Lag, least: float) -> bool:
+    return lag.gain > least and lag.evidence > _MIN_EVIDENCE
 
 
 def _note(name: str, other: str, lag: Lag) -> Contradiction:

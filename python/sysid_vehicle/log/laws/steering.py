@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..._common.arrays import FloatArray
 from .motion import Motion
-from .regression import Lag, coarse_lags, find_lag, regress
+from .regression import Lag, coarse_lags, find_lag, fitted
 
 _LEAST_MPS = 3.0  # below, slip angles mean nothing
 _FRONT_M = 1.25  # from centre of gravity to front axle; corrected by a coefficient
@@ -47,7 +49,7 @@ def several_frequencies(m: Motion) -> bool:
     return float(share @ (f - mean) ** 2) / whole > (_NARROW * mean) ** 2
 
 
-def steering_lag(m: Motion, usable: np.ndarray) -> Lag:
+def steering_lag(m: Motion, usable: np.ndarray, enough: Callable[[Lag], bool]) -> Lag:
     """Return the lag of `steer_rad` behind the force of the front axle.
 
     Parameters
@@ -56,6 +58,8 @@ def steering_lag(m: Motion, usable: np.ndarray) -> Lag:
         With `vy_mps`.
     usable : ndarray of bool, shape (count,)
         Windows to use.
+    enough : callable
+        As in :func:`.regression.find_lag`.
 
     Notes
     -----
@@ -81,13 +85,11 @@ def steering_lag(m: Motion, usable: np.ndarray) -> Lag:
         return [*bent, m.mean(angle), *rest, m.mean(pull * np.tanh(angle / _LOADED_RAD))]
 
     # The slope of the curve tells what errors of the slip angle do. A late angle would flatten it.
-    first = [
-        regress(
-            felt[usable], np.column_stack(curve(slip(lag)))[usable], _CURVE_PRIOR, _CURVE_SPREAD
-        )
+    first = (
+        fitted(felt[usable], np.column_stack(curve(slip(lag)))[usable], _CURVE_PRIOR, _CURVE_SPREAD)
         for lag in coarse_lags()
-    ]
-    b = min(first, key=lambda r: r.scale).coefficients
+    )
+    b, _, _ = min(first, key=lambda found: found[2])
 
     def slope(angle: FloatArray) -> FloatArray:
         near = np.clip(angle[:, None] / _KNEES_RAD, -20.0, 20.0)
@@ -104,7 +106,7 @@ def steering_lag(m: Motion, usable: np.ndarray) -> Lag:
 
     mean = np.concatenate([_CURVE_PRIOR, np.zeros(4)])
     spread = np.concatenate([_CURVE_SPREAD, _ERROR_SPREAD])
-    return find_lag(sides, mean, spread, usable, _steered(m, pull))
+    return find_lag(sides, mean, spread, usable, _steered(m, pull), enough)
 
 
 def _steered(m: Motion, pull: FloatArray) -> FloatArray:
