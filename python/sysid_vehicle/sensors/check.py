@@ -22,6 +22,7 @@ from .kinematics.equations import FAULTS, SWINGS, Readings
 from .kinematics.estimate import Estimate, estimate, noise_of, preferred
 from .kinematics.motion import Grid, Stretch
 from .kinematics.parts import cut
+from .kinematics.swing import swings_as, with_swings
 from .result import SensorCheck
 from .signals import MOVING, Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
 
@@ -101,7 +102,7 @@ def checked(
     `told` are signals of the logs as they were read, by default of these. `enough` is asked with
     this estimate and the faults that it tells. Parts of the driving only take claims back;
     explanations without a fault do too, unless one of them is the better one. So does a body that
-    swings, where it is likelier.
+    swings: in the place of one fault, or of all, where that is likelier.
     """
     stretches = pieces(together)
     readings = readings_of(together, stretches)
@@ -116,50 +117,65 @@ def checked(
         faults_of, absent=lacking, wheelbase_m=None if vehicle is None else vehicle.wheelbase_m
     )
 
-    means = [averaged(r, _MEAN_S) for r in readings]
-
     def of(
-        some: Sequence[Readings],
+        slow: Sequence[Readings],
         where: Sequence[Stretch],
         without: Collection[str],
         begin: dict[str, float] | None = None,
     ) -> Estimate:
-        slow = means if some is readings else [averaged(r, _MEAN_S) for r in some]
         names = [name for name in _names(have) if name not in without]
         return estimate(slow, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
 
+    lacks = frozenset(SWINGS)
+    found = of([averaged(r, _MEAN_S) for r in readings], stretches, lacks)
+    may_swing = lacks <= {*_names(have)}
+    if may_swing:
+        readings = [with_swings(r, found) if r.channel == "ay_mps2" else r for r in readings]
+    means = [averaged(r, _MEAN_S) for r in readings]
+
+    def part(some: Sequence[Stretch]) -> list[Readings]:
+        own = readings_of(together, some)
+        swung = [swings_as(r, some, of, stretches) for r, of in zip(own, readings, strict=True)]
+        return [averaged(r, _MEAN_S) for r in swung]
+
     @cache  # a second search asks for most of them again
     def of_all(lacks: frozenset[str]) -> Estimate:
-        return of(readings, stretches, lacks)
+        return of(means, stretches, lacks)
+
+    def against(found: Estimate, lacks: frozenset[str]) -> Rival:
+        other = of_all(lacks)
+        return Rival(other, preferred(means, found, other))
 
     def explained(found: Estimate, lacks: frozenset[str]) -> tuple[Estimate, Faults]:
         parts = []
         for some in cut(stretches):
             with suppress(SysidError):  # a part may hold too little
-                parts.append(of(readings_of(together, some), some, lacks))
+                parts.append(of(part(some), some, lacks))
         faults = told_of(found, parts=parts)
         for left in range(_SEARCHES, -1, -1):
-            rivals = {}
-            for without in doubted([fault.name for fault in faults if fault.found]):
-                other = of_all(lacks.union(without))
-                rivals[without] = Rival(other, preferred(means, found, other))
-            faults = told_of(found, parts=parts, rivals=rivals)
+            names = [fault.name for fault in faults if fault.found]
+            rivals = {without: against(found, lacks.union(without)) for without in doubted(names)}
+            doubts = dict(rivals)
+            if (
+                may_swing
+            ):  # a body that swings takes the place of a fault, too, where it is likelier
+                swung = {without: against(found, frozenset(without)) for without in rivals}
+                doubts |= {without: rival for without, rival in swung.items() if rival.worse < 0.0}
+            faults = told_of(found, parts=parts, rivals=doubts)
             best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
             if not left or best is None or best.worse >= 0.0:
                 break
-            better = of(readings, stretches, lacks, best.estimate.faults)
+            better = of(means, stretches, lacks, best.estimate.faults)
             if preferred(means, better, found) <= 0.0:
                 break
             found = better
             faults = told_of(found, parts=parts)
         return found, faults
 
-    lacks = frozenset(SWINGS)
-    found = of_all(lacks)
     faults = told_of(found)
     if not enough(found, faults):
         found, faults = explained(found, lacks)
-        if lacks <= {*_names(have)}:
+        if may_swing:
             swinging = of_all(frozenset())
             if preferred(means, swinging, found) > _SWINGS:
                 found, faults = explained(swinging, frozenset())

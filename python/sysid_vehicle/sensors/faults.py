@@ -341,6 +341,13 @@ def _instead(found: Estimate, rival: Estimate, told: _Told) -> str:
         for name, sigma in zip(found.faults, std, strict=True)
         if name in rival.faults and name not in told.of
     }
+    std = np.sqrt(np.diag(rival.null_covariance))
+    claimed = {
+        name: abs(value) / sigma
+        for (name, value), sigma in zip(rival.faults.items(), std, strict=True)
+        if name not in found.faults
+    }
+    moved |= claimed
     return max(moved, key=lambda name: moved[name])
 
 

@@ -18,7 +18,6 @@ from ..vehicle import GRAVITY_MPS2
 from .kinematics.colour import neighbours
 from .kinematics.equations import Readings
 from .kinematics.motion import IntArray, Stretch
-from .kinematics.swing import with_swings
 
 MOVING = MEASURED  # channels of which the motion is made
 _SHORTEST_S = 3.0
@@ -162,8 +161,7 @@ def readings_of(logs: Sequence[Log], stretches: Sequence[Stretch]) -> list[Readi
                 f"{names}: {channel} holds only {joined.size} samples while the car moves; give a "
                 f"log with at least {_FEWEST}"
             )
-        made = Readings(channel, np.concatenate(at), np.concatenate(times), joined)
-        result.append(with_swings(made) if channel == "ay_mps2" else made)
+        result.append(Readings(channel, np.concatenate(at), np.concatenate(times), joined))
     return result
 
 

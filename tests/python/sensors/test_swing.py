@@ -34,7 +34,7 @@ def lap() -> sv.Log:
 
 
 @pytest.mark.parametrize(("natural_hz", "damping"), [(1.5, 0.25), (1.8, 0.35)])
-@pytest.mark.parametrize("above_m", [0.5, -0.3])
+@pytest.mark.parametrize("above_m", [0.5, -0.3, -0.5])
 def test_an_imu_at_another_height_is_no_other_fault(
     lap: sv.Log, above_m: float, natural_hz: float, damping: float
 ) -> None:
@@ -44,12 +44,22 @@ def test_an_imu_at_another_height_is_no_other_fault(
     assert abs(roll.value - ROLL) < 3.0 * roll.std
     for name in (*_DELAYS, "gain_yaw_rate", "imu_forward_m"):
         assert abs(check[name].value) < 3.0 * check[name].std
-    assert "where the roll of the body swings" in str(check)
-    assert "speeds that were smoothed" in str(check)
+    if above_m > 0.0:  # below the speed sensor it is hidden by how late gravity by roll comes
+        assert "where the roll of the body swings" in str(check)
+        assert "speeds that were smoothed" in str(check)
 
 
-def test_a_body_that_does_not_swing_is_not_said_to(lap: sv.Log) -> None:
-    noise = np.random.default_rng(7).normal(0.0, 0.1, lap["time_s"].size)
-    check = sv.check(lap.corrected({"ay_mps2": lap["ay_mps2"] + noise}, []))
-    assert check.found == ()
-    assert "swings" not in str(check)
+def test_what_a_swinging_body_explains_as_well_is_no_fault(lap: sv.Log) -> None:
+    delay = sv.check(rolling(lap, -0.5, 1.8, 0.35))["delay_vy_s"]
+    assert not delay.found
+    assert "an IMU above the speed sensor, on a body that rolls" in delay.why_not
+
+
+@pytest.mark.parametrize("seed", [835833, 400135, 29175, 490582])
+def test_a_body_that_does_not_swing_is_not_said_to(seed: int) -> None:
+    """Readings that swing with their own noise said so of one log in three."""
+    truth = sv.Model(sv.example_vehicle())
+    for road in (sv.manoeuvres.lap(60.0), sv.manoeuvres.handling_course()):
+        check = sv.check(sv.drive(truth, road, seed=seed), truth.vehicle)
+        assert check.found == ()
+        assert "swings" not in str(check)

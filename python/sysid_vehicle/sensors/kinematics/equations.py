@@ -106,8 +106,8 @@ class Readings:
     values : ndarray, shape (n,)
         What was written; never NaN.
     swings : ndarray, shape (n, len(SWINGS)), optional
-        Second derivatives of `values` [m/s4] as a body follows them that swings, of an axis that
-        feels them (`swing.py`).
+        Second derivatives of what should have been written [m/s4], as a body follows it that
+        swings, of an axis that feels them (`swing.py`).
     """
 
     channel: str
