@@ -5,7 +5,7 @@ from .alike import alike_in_force, without_force, without_unlearned
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import UNITS, Driving
 from .filters import FilterRun, FilterState, StateFilter, StateModel
-from .input_noise import noisier
+from .input_noise import again, noisier
 from .late import LateMeasurements
 from .noise import (
     Learned,
@@ -31,6 +31,7 @@ __all__ = [
     "NoiseModel",
     "StateFilter",
     "StateModel",
+    "again",
     "alike_in_force",
     "equal_blocks",
     "first_guess",

@@ -16,7 +16,7 @@ import numpy as np
 from .._common.arguments import generator
 from .._common.memo import remembered
 from ..errors import NumericalError
-from ..estimate import Driving, noisier
+from ..estimate import Driving, again, noisier
 from .fit import Fit
 from .offsets import driving_of
 
@@ -35,8 +35,8 @@ def lost_to_input_noise(fit: Fit, driving: Driving) -> float:
     """
     own = driving if driving is fit.driving else driving_of(fit, driving)
     problem, p = own.problem(fit.model), fit.model.vector()
-    # The same noise for all models.
-    other = own.problem(fit.model, other_inputs=noisier(own, own.inputs(), generator(0)))
+    noise = again(own, generator(0))  # the same for all models
+    other = own.problem(fit.model, other_inputs=noisier(own, own.inputs(), noise))
     try:
         gains: Any = problem.freeze(p, fit.noise.vector())
         moved = other.residuals(p, gains) - problem.residuals(p, gains)

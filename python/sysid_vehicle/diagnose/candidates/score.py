@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from ... import _core
 from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect
@@ -27,11 +28,13 @@ from ...rules import USUAL, Rules
 from ..evidence.coordinates import blocks
 from ..evidence.directions import Ask, Columns, Directions
 from ..evidence.evidence import Evidence
+from ..evidence.input_noise import added_by_input_noise
 from ..evidence.projection import pseudo_inverse
 from ..evidence.sensitivity import Sensitivities, duration, sensitivities
 
 _BLOCK_S, _FEWEST_BLOCKS = 0.5, 24
 _DRAWN = 1 << 22  # random numbers at once
+_ROUNDED = float(np.sqrt(np.finfo(float).eps))  # of the residuals, all that an effect moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,16 +174,30 @@ def score_board_of(
     every = projected.place(found)
     after = np.diag(projected.information)[every]
     before = projected.before[every]
+    numbers = _core.CHANNELS * evidence.driving.samples
     visible: list[tuple[Effect, float, slice]] = []
     kept: list[int] = []
     for effect in found.candidates:
         own = found.places[effect.id]
         retained = float(np.sqrt(after[own].sum() / max(before[own].sum(), 1e-300)))
-        if retained >= rules.retained:
+        moves = float(np.sqrt(before[own].sum())) * max(p.typical for p in effect.parameters)
+        if retained >= rules.retained and moves > _ROUNDED * np.sqrt(numbers):
             visible.append((effect, retained, slice(len(kept), len(kept) + own.stop - own.start)))
             kept += list(range(own.start, own.stop))
     information = projected.information[np.ix_(kept, kept)]
     S = projected.score[kept]
+    claimed = {
+        effect.id: own
+        for effect, _, own in visible
+        if _p_value(effect, S[None, own], information[own, own])[0] < rules.alpha
+    }
+    if claimed:
+        some = sensitivities(evidence, [e for e, *_ in visible if e.id in claimed])
+        added = added_by_input_noise(
+            evidence, some, lambda noisy, _: sensitivities(noisy, some.candidates)
+        )
+        for name, own in claimed.items():
+            S[own] -= added[some.places[name]]
     covariance = np.zeros_like(information)
     for *_, own in visible:
         covariance[own, own] = pseudo_inverse(information[own, own])[0]
@@ -192,7 +209,7 @@ def score_board_of(
     seconds = duration(evidence.driving)
     block_s = min(_BLOCK_S, evidence.driving.usable_s / _FEWEST_BLOCKS)
     told = projected.answer(found, Ask(None, sizes, blocks(evidence.driving, block_s)))
-    ratios, added = told.ratios[kept], told.blocks[:, kept]
+    ratios, chance = told.ratios[kept], told.blocks[:, kept]
     scores = [
         _score(
             effect,
@@ -215,7 +232,7 @@ def score_board_of(
         {effect.id: own for effect, _, own in visible},
         S,
         information,
-        added / np.sqrt(more),
+        chance / np.sqrt(more),
         found,
         projected,
     )

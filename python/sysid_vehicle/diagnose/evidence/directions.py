@@ -191,6 +191,11 @@ class Directions:
         """Where the columns of a source stand."""
         return self._places[self.sources.index(source)]
 
+    def take_off(self, source: Columns, added: FloatArray) -> None:
+        """Take off the scores of a source what is known to be no evidence; it is asked anew."""
+        self.score[self.place(source)] -= added
+        self._answers.pop(source, None)
+
     def spans(self, kept: npt.NDArray[np.bool_]) -> list[tuple[slice, FloatArray]]:
         """For each group the columns it has, and a matrix that makes an orthonormal basis of them.
 

@@ -78,11 +78,14 @@ class Evidence:
     driving : Driving
     inputs : array, shape (samples, 2), optional
         In place of the driving's own steering angle and wheel force.
+    gains : optional
+        Of the filter, in place of those at the fit with these inputs.
     """
 
     fit: Fit
     driving: Driving
     inputs: FloatArray | None = None
+    gains: Any = None
 
     @cached_property
     def problem(self) -> DrivingProblem:
@@ -96,6 +99,8 @@ class Evidence:
     @cached_property
     def frozen(self) -> Any:
         """The filter at the fit."""
+        if self.gains is not None:
+            return self.gains
         return self.problem.freeze(self.fit.model.vector(), self.fit.noise.vector())
 
     @cached_property

@@ -27,7 +27,7 @@ import scipy
 
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import HALF_95
-from ...estimate import noisier
+from ...estimate import again, noisier
 from ...estimate.driving import Span
 from ...identify import refine, refit, relearn
 from ..evidence.evidence import Evidence, solve
@@ -199,7 +199,7 @@ def _by_input_noise(
     driving, p = evidence.driving, evidence.fit.model.vector()
     scores = []
     for _ in range(_DRAWS):
-        noisy = noisier(driving, inputs, rng)
+        noisy = noisier(driving, inputs, again(driving, rng))
         problem = driving.problem(evidence.fit.model, other_inputs=noisy)
         change = evidence.residual - problem.residuals(p, evidence.frozen).ravel()
         scores.append(float(direction @ change))

@@ -25,6 +25,7 @@ from ...vehicle import GRAVITY_MPS2
 from ..evidence.coordinates import begins, late
 from ..evidence.directions import Ask, Directions
 from ..evidence.evidence import FORCES, READINGS, Evidence, Section
+from ..evidence.input_noise import added_by_input_noise
 from ..evidence.projection import pseudo_inverse
 
 _FORCE_SHAPES, _FEW_SHAPES = 12, 4  # signals that act on each force, and on each of the others
@@ -91,6 +92,14 @@ def omnibus_of(
     if projected is None:
         projected = Directions(evidence, Unknown(evidence))
     unknown = next(s for s in projected.sources if isinstance(s, Unknown))
+    found = _tested(unknown, projected, rules)
+    if not found.rejects:
+        return found
+    projected.take_off(unknown, added_by_input_noise(evidence, unknown, unknown.noisier))
+    return _tested(unknown, projected, rules)
+
+
+def _tested(unknown: Unknown, projected: Directions, rules: Rules) -> Omnibus:
     targets, values, ranks = unknown.tested(projected)
     ratios = np.maximum(projected.answer(unknown).ratios[: len(ranks)], 1.0)
     statistics = projected.score[projected.place(unknown)] @ values / ratios
@@ -117,6 +126,8 @@ class Unknown:
     evidence : Evidence
     like : Unknown, optional
         Of other driving, in whose units signals are.
+    noise : array, shape (samples, 2), optional
+        That is added to the measured steering and pull.
 
     Attributes
     ----------
@@ -126,12 +137,19 @@ class Unknown:
         Of turns of the steering and of the pull.
     """
 
-    def __init__(self, evidence: Evidence, like: Unknown | None = None) -> None:
+    def __init__(
+        self,
+        evidence: Evidence,
+        like: Unknown | None = None,
+        noise: FloatArray | None = None,
+    ) -> None:
         self.evidence = evidence
         driving = evidence.driving
         self._steer = driving.channel("steer_rad")
-        turn = self._turned(self._steer, begins(driving))
         self._pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
+        if noise is not None:
+            self._steer, self._pull = self._steer + noise[:, 0], self._pull + noise[:, 1]
+        turn = self._turned(self._steer, begins(driving))
         own = max(float(np.std(turn)), 1e-9), max(float(np.nanstd(self._pull)), 1e-9)
         self.units: tuple[float, float] = own if like is None else like.units
         self._turn_std, self._pull_std = self.units
@@ -143,6 +161,10 @@ class Unknown:
                 count = _FORCE_SHAPES if number <= 2 else _FEW_SHAPES
                 self.names += [target] * count
                 self.targets += [number] * count
+
+    def noisier(self, evidence: Evidence, noise: FloatArray) -> Unknown:
+        """The same of noisier evidence."""
+        return Unknown(evidence, self, noise)
 
     @property
     def width(self) -> int:

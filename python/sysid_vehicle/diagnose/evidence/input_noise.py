@@ -1,0 +1,68 @@
+"""What noise of the measured inputs adds to scores.
+
+Directions are worked out from the same noisy inputs as the residuals: where an effect scales an
+input, or moves it in time, its noise stands in both, and their product does not average out. Where
+little else moves, the score then asks for no input at all. With as much noise once more it changes
+by as much as it has changed already (simulation and extrapolation, Cook & Stefanski, JASA 1994).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..._common.arguments import generator
+from ..._common.arrays import FloatArray, as_float64
+from ...estimate import again, noisier
+from .directions import Columns
+from .evidence import Evidence
+
+_DRAWS = 2
+
+Noisier = Callable[[Evidence, FloatArray], Columns]
+"""Columns of the evidence with noisier inputs, and of that noise, shape (samples, 2)."""
+
+
+def added_by_input_noise(evidence: Evidence, columns: Columns, noisier_ones: Noisier) -> FloatArray:
+    """What noise of the inputs has added to the scores of columns, shape (width,).
+
+    What the fitted parameters can do of a column is taken off as it was. Of the residuals they can
+    do as little of the noise as they are fewer than the samples.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    columns : Columns
+        Its own.
+    noisier_ones : callable
+        Makes the same columns of noisier evidence.
+    """
+    rng = generator(0)
+    return as_float64(
+        np.mean([_added(evidence, columns, noisier_ones, rng) for _ in range(_DRAWS)], axis=0)
+    )
+
+
+def _added(
+    evidence: Evidence, columns: Columns, noisier_ones: Noisier, rng: np.random.Generator
+) -> FloatArray:
+    driving = evidence.driving
+    inputs = driving.inputs() if evidence.inputs is None else evidence.inputs
+    noise = again(driving, rng)
+    noisy = replace(evidence, inputs=noisier(driving, inputs, noise), gains=evidence.frozen)
+    other = noisier_ones(noisy, noise)
+    free = len(evidence.fit.model.free_names)
+    square, across = np.zeros((free, free)), np.zeros((free, columns.width))
+    own, product = np.zeros(free), np.zeros(columns.width)
+    for section, moved in zip(evidence.sections(), noisy.sections(), strict=True):
+        change = moved.residual - section.residual
+        G, F = columns.of(section), section.fitted
+        square += F.T @ F
+        across += F.T @ G
+        product += (other.of(moved) - G).T @ change
+        own += (moved.fitted - F).T @ change
+    scale = np.sqrt(np.maximum(np.diag(square), 1e-300))
+    copied = np.linalg.lstsq(square / np.outer(scale, scale), across / scale[:, None], rcond=None)
+    return as_float64(product - (own / scale) @ copied[0])
