@@ -97,7 +97,8 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     usual = max(_USUAL_S, _LEVER_M / speed)
     there = [sides(**{_SIDE[name]: 1.0})(at) for at in (0.0, lags[name].seconds)]
     arm = m.change(c["yaw_rate_radps"])[usable]
-    scale = _scale([(y[usable], x[usable]) for y, x in there], arm, spread)
+    rows = [(y[usable], x[usable]) for y, x in there]
+    scale = _scale(rows, arm, spread, _MIN_GAIN[name])
     if scale is not None:
         return [scale]
     if not _told(lags[name], usual, usual, _MIN_GAIN[name]):
@@ -111,7 +112,7 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
 
 
 def _scale(
-    there: list[tuple[FloatArray, FloatArray]], arm: FloatArray, spread: FloatArray
+    there: list[tuple[FloatArray, FloatArray]], arm: FloatArray, spread: FloatArray, gain: float
 ) -> Contradiction | None:
     """Tell of a lateral speed in another unit: what it is nearer to than to metres per second.
 
@@ -119,37 +120,43 @@ def _scale(
     ----------
     there : list of ndarray, shape (n,), and ndarray, shape (n, 3)
         Change of the lateral speed; specific force, minus speed times yaw rate, one. As they are
-        and moved in time: what fits better counts.
+        and moved in time.
     arm : ndarray, shape (n,)
         Change of the yaw rate, which a sensor ahead of the others adds.
     spread : ndarray, shape (3,)
         Of the prior for `x`.
+    gain : float
+        By which moving them in time has to lower the misfit: in the wrong unit a lag explains a
+        part of it, and the factor is another one then.
     """
     nearer = math.sqrt(min(SPEED_UNITS.values()))
     # At one frequency an arm of the sensor looks like a unit, unless it would be too long.
     for columns, reach, limit in (([arm], [_LEVER_M], nearer), ([], [], math.exp(UNNAMED))):
         spreads = np.array([np.inf, *spread[1:], *reach])
-        found = min(
-            (
-                regress(
-                    y,
-                    np.column_stack([x[:, 0] + x[:, 1], x[:, 1:], *columns]),
-                    np.zeros(len(spreads)),
-                    spreads,
-                )
-                for y, x in there
-            ),
-            key=lambda fitted: fitted.scale,
+        found, moved = (
+            regress(
+                y,
+                np.column_stack([x[:, 0] + x[:, 1], x[:, 1:], *columns]),
+                np.zeros(len(spreads)),
+                spreads,
+            )
+            for y, x in there
         )
-        times = float(found.coefficients[0])
-        if found.coherence >= _COHERENT and times - SURE * float(found.deviations[0]) > limit:
+        if found.scale**2 > gain * moved.scale**2:
+            found = moved
+        times, sure = float(found.coefficients[0]), SURE * float(found.deviations[0])
+        if found.coherence >= _COHERENT and times - sure > limit:
             break
     else:
         return None
-    units = ", ".join(f"{unit} {more:.3g}" for unit, more in SPEED_UNITS.items())
+    off = {unit: abs(times - more) for unit, more in SPEED_UNITS.items()}
+    near = [unit for unit in sorted(off, key=lambda unit: off[unit]) if off[unit] <= sure]
+    named = f"it seems to be in {' or '.join(near)}" if near else "check its unit"
+    more = ", ".join(f"{1.0 / SPEED_UNITS[unit]:.4g} for {unit}" for unit in near or SPEED_UNITS)
     text = (
-        f"vy_mps: changes {times:.3g} times as much as ay_mps2 - vx_mps * yaw_rate_radps demands; "
-        f"check its unit ({units} times), and put its factor in the channel map"
+        f"vy_mps: changes {times:.3g} times ({times - sure:.3g} to {times + sure:.3g}) as much as "
+        f"ay_mps2 - vx_mps * yaw_rate_radps demands; {named}: put its factor in the channel map "
+        f"({more})"
     )
     return Contradiction("vy_mps", text)
 
