@@ -31,7 +31,7 @@ _COHERENT = 0.6
 # What logs of good cars are off by: the commanded force by its gain and by slopes, the steering by
 # compliance and by tyres.
 _FORCE_STD, _FORCE_FACTOR = 0.45, 1.7
-_STEER_STD, _STEER_FACTOR = 0.2, 2.0
+_STEER_STD = 0.2
 _STEER_NEVER = 2.8  # whatever the differential
 _UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003  # rad of road wheels per m/s2
 _UNDERSTEER_MOST = 0.008  # rad per m/s2 either way: 4.5 deg/g, more than cars have
@@ -82,8 +82,8 @@ class _Told:
 def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
     """Refuse a log that is not one of this car: by its mass, by its wheelbase.
 
-    Of a steering angle that is off by less than a steering ratio or a unit it is warned: a locked
-    differential asks for twice the angle as well.
+    Of a steering angle that is off by less than a steering ratio or a unit it is warned, as soon as
+    it surely is: a locked differential asks for up to twice the angle as well.
 
     Raises
     ------
@@ -105,14 +105,16 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
             f"{mass_kg / mass.ratio:.4g} kg, {mass.place}; {likely}"
         )
     steer = _steer(drive, wheelbase_m)
-    if steer is not None and steer.off(_STEER_FACTOR, _STEER_STD):
+    if steer is not None and steer.off(1.0, _STEER_STD):
         likely = _likely(steer, _LENGTH_SLIPS) or (
             f"if it was made from the angle of the steering wheel, the steering ratio is about "
             f"{steer.ratio:.2g} times the one that was taken: put factor = {1.0 / steer.ratio:.3g} "
             f"times the present one in the channel map; else check lf_m and lr_m"
+            f"{'; a locked differential asks for more angle, too' if steer.ratio > 1.0 else ''}"
         )
         said = (
-            f"{log.name}: steer_rad is {steer.ratio:.3g} times what a wheelbase of "
+            f"{log.name}: steer_rad is {steer.ratio:.3g} times ({steer.low:.2g} to "
+            f"{steer.high:.2g}) what a wheelbase of "
             f"{wheelbase_m:g} m (lf_m + lr_m) asks for, {steer.place}; {likely}"
         )
         if abs(math.log(steer.ratio)) > math.log(_STEER_NEVER):
