@@ -88,4 +88,9 @@ def written_map(log: Path, to: Path | None, dbc: Path | None, vehicle: Vehicle |
         print(f"Channel map: {to}", file=sys.stderr)
     for name in found.missing:
         warn(f"{name}: no column was found for it; name it in the channel map")
+    if found.needs_pull:
+        warn(
+            "ax_mps2, fx_n: no column was found for either; name one of them in the channel map: "
+            "nothing else tells how the car is driven and braked"
+        )
     return found

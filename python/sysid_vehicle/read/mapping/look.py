@@ -15,6 +15,7 @@ from .names import rank, si_unit
 
 _RATE_HZ = 50.0  # at which units and signs are looked for
 _FEWEST = 100
+_GAP_S, _GAP_PERIODS = 1.0, 5.0  # longer than both is a gap
 
 Signal = tuple[FloatArray, FloatArray]
 """Times and values."""
@@ -105,7 +106,10 @@ def ended(channel: str, name: str, unit: str) -> str:
 def even(
     held: Mapping[str, Signal], factor: float
 ) -> tuple[FloatArray, dict[str, FloatArray]] | None:
-    """The channels on common even times, to look at: interpolated, for nothing else."""
+    """The channels on common even times, to look at: interpolated, for nothing else.
+
+    Times of gaps are left out: what lies between is no driving.
+    """
     known = {}
     for channel, (clock, values) in held.items():
         there = np.isfinite(clock) & np.isfinite(values)
@@ -119,4 +123,10 @@ def even(
     if (end - begin) * _RATE_HZ < _FEWEST:
         return None
     time_s = np.arange(begin, end, 1.0 / _RATE_HZ)
+    for clock, _ in known.values():
+        step = np.diff(clock)
+        for i in np.flatnonzero(step > max(_GAP_S, _GAP_PERIODS * float(np.median(step)))):
+            time_s = time_s[(time_s <= clock[i]) | (time_s >= clock[i + 1])]
+    if time_s.size < _FEWEST:
+        return None
     return time_s, {c: np.interp(time_s, t, values) for c, (t, values) in known.items()}

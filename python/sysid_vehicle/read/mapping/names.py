@@ -29,7 +29,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"^[uv] ?x( mps)?$",
         r"twist linear x$|(long\w*|forward) (speed|vel\w*)|(speed|vel\w*) (x|long\w*)$",
         r"(vehicle|ground|corr\w*|gps|car|veh) (speed|vel\w*)|^v (veh|car|ego)|v (fzg|signal)",
-        r"^(fzg|fahrzeug) ?geschw\w*|^veh v\b",
+        r"^(fzg|fahr(zeug)?) ?geschw\w*|^veh v\b",
         r"(speed|vel\w*) forward$|\bvel\w* hor x$|^wheel based vehicle speed",
         r"^(speed|velocity|vel|geschwindigkeit|v)$",
         r"\b(speed|velocity|geschwindigkeit)\b",
@@ -67,7 +67,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"\bacc (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
     ),
     "steer_rad": (
-        r"road ?wheel angle|^steer rad$|front wheel angle",
+        r"road ?wheel( angle)?$|^steer rad$|front wheel angle",
         r"steer\w* ?(wheel )?ang\w*|lenk ?(rad ?)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
         r"\b(steer|steering|steered|delta( ?wheel)?)\b|\b(sas|lws|lwi) (ang\w*|winkel)$",
         r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",

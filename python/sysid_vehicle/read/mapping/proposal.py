@@ -16,6 +16,7 @@ _WHEELS = (
     "take the axle that is not driven, and as the factor in rad/s the radius of its tyres [m], "
     "in rpm 0.1047198 times that, in km/h 0.2777778"
 )
+_PULL = ("ax_mps2", "fx_n")
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,11 @@ class Proposal:
             ground=Ground(parts, angles) if parts else None,
         )
 
+    @property
+    def needs_pull(self) -> bool:
+        """Whether nothing was found that tells how the car is driven and braked."""
+        return not {*_PULL} & {*self.channels}
+
     def to_toml(self) -> str:
         """The map as a file to look through and to edit."""
         lines = ["# Proposed channel map: look at every line, mend what is wrong."]
@@ -110,6 +116,11 @@ class Proposal:
             entry = f"column = {_quoted(column)}, factor = 1.0"
             entry += f", mean_with = [{', '.join(map(_quoted, others))}]" if others else ""
             lines.append(f"# {name} = {{ {entry} }}")
+        if self.needs_pull:
+            lines.append(
+                "# Nothing was found for either; one is needed, for how the car is driven:"
+            )
+            lines += [f'# {name} = {{ column = "", factor = 1.0 }}' for name in _PULL]
         if self.ground:
             lines += [
                 "",
