@@ -184,7 +184,8 @@ def _check(
             raise InvalidInput(said)
         notes.append(said)
     with np.errstate(over="ignore"):
-        found = check_coherence(channels, rate_hz)
+        base = None if vehicle is None else vehicle.wheelbase_m
+        found = check_coherence(channels, rate_hz, wheelbase_m=base)
     # What is doubted for cars of usual size is compared with the car itself where it is fitted.
     notes += [doubtful.text for doubtful in found if vehicle is None or not doubtful.by_the_car]
     dull = checks.excitation_note(channels, rate_hz)

@@ -99,3 +99,25 @@ def test_a_fast_model_car_needs_little_force() -> None:
         log = Log.from_arrays(table)
     assert np.abs(log["fx_n"]).max() < 30.0
     assert np.median(log["vx_mps"]) > 15.0
+
+
+def test_a_quick_model_car_needs_little_force() -> None:
+    """A slalom at 18 m/s asks 8 N of a car of 22 kg; it was refused as a force in kN."""
+    base = sv.example_vehicle()
+    car = replace(
+        base,
+        mass_kg=22.0,
+        yaw_inertia_kgm2=1.5,
+        lf_m=0.2 * base.lf_m,
+        lr_m=0.2 * base.lr_m,
+        cg_height_m=0.2 * base.cg_height_m,
+        track_front_m=0.2 * base.track_front_m,
+        track_rear_m=0.2 * base.track_rear_m,
+        drag_area_m2=0.04 * base.drag_area_m2,
+    )
+    driven = sv.drive(sv.Model(car), sv.manoeuvres.slalom(), seed=88123)
+    log = {name: driven[name] for name in driven.channels}
+    assert 1.0 < np.abs(log["fx_n"]).max() < 30.0
+    assert "fx_n" in Log.from_arrays(log, vehicle=car).channels
+    with pytest.raises(sv.InvalidInput, match=r"fx_n: .* of a model car, read the log with its"):
+        Log.from_arrays(log)

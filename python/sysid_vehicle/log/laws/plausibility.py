@@ -90,7 +90,9 @@ _SLIDING_SLIPS: Slips = (
 )
 
 
-def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[Contradiction]:
+def check_coherence(
+    columns: Mapping[str, FloatArray], rate_hz: float, *, wheelbase_m: float | None = None
+) -> list[Contradiction]:
     """Refuse channels in a wrong unit, with a wrong sign, or that belong to another drive.
 
     Parameters
@@ -99,6 +101,8 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[C
         Canonical channels on a uniform grid, `time_s` among them.
     rate_hz : float
         Rate of the grid.
+    wheelbase_m : float, optional
+        Of the car, where it is known: a model car needs little force.
 
     Returns
     -------
@@ -122,7 +126,7 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[C
     if np.count_nonzero(rows) < MIN_WINDOWS:
         return check_ranges(columns, rate_hz) + check_lost(given, lost)
     drive = Drive(motion, rows)
-    model_car = is_model_car(drive)
+    model_car = is_model_car(drive, wheelbase_m)
     problem: Implausible | None = None
     try:
         implausible = check_ranges(columns, rate_hz, model_car=model_car)

@@ -229,7 +229,7 @@ def _check_force(columns: Mapping[str, FloatArray], model_car: bool) -> None:
             "fx_n",
             f"fx_n: is at most {largest:.3g} N over samples 0 to {force.size - 1} at "
             f"{typical:.3g} m/s, where drag alone takes more: if it is in kN, put factor = 1000 "
-            f"in the channel map",
+            f"in the channel map; of a model car, read the log with its vehicle file",
         )
     usual = float(np.median(np.abs(force)))
     if usual > _HOLDING_N + _HOLDING_NS2PM2 * typical**2:

@@ -73,8 +73,10 @@ def _steering(drive: Drive) -> _Steering | None:
     return _Steering(ay, steer, rows, answer, cosine(curvature[rows], steer[rows]))
 
 
-def is_model_car(drive: Drive) -> bool:
-    """Whether the steering answers as that of a car which carries no driver."""
+def is_model_car(drive: Drive, wheelbase_m: float | None = None) -> bool:
+    """Whether the wheelbase is that of a car which carries no driver, or the steering says so."""
+    if wheelbase_m is not None:
+        return wheelbase_m < _NO_DRIVER_M
     told = _steering(drive)
     if told is None or told.answer.coherence < _STEERED:
         return False
