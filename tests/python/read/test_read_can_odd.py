@@ -230,3 +230,17 @@ def test_units_of_databases(tmp_path: Path, dbc: Path, frames: Frames, unit: str
     path = written(tmp_path / "run.blf", frames)
     dbc.write_text(DBC.replace("deg/s", unit), encoding="utf-8")
     check_values(read_told(path, dbc=dbc), atol=0.01)
+
+
+def test_a_blf_that_was_cut_off(tmp_path: Path, dbc: Path, frames: Frames) -> None:
+    """It was read to there without a word."""
+    path = tmp_path / "run.blf"
+    with can.BLFWriter(path, max_container_size=2048) as writer:
+        for frame in frames:
+            writer.on_message_received(frame)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    stated = rf"run\.blf breaks off: it holds {len(whole) // 2} of the {len(whole)} bytes"
+    with pytest.warns(SysidWarning, match=stated):
+        log = read_log(path, SI, dbc=dbc, check=False)
+    assert 100 < log.n < 300

@@ -56,6 +56,11 @@ def frames_of(path: Path, notes: list[str]) -> Iterator[Frame]:
 
         with can.BLFReader(path) as reader:
             yield from _of_library(reader, first_bus=1)
+            if reader.file_size > path.stat().st_size:
+                notes.append(
+                    f"{path.name} breaks off: it holds {path.stat().st_size} of the "
+                    f"{reader.file_size} bytes that it states; what is there was read"
+                )
         return
     text = read_text_table(path)
     first = next((line.strip() for line in text.splitlines() if line.strip()), "")

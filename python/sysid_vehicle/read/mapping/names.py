@@ -98,7 +98,8 @@ _REFUSED: dict[str, str] = {
     "yaw_rate_radps": r"\b(acc\w*|target|ref\w*|covariance)\b",
     "ax_mps2": r"\b(yaw|lat\w*|vert\w*|angular|covariance|target)\b",
     "ay_mps2": r"\b(yaw|long\w*|vert\w*|angular|covariance|target)\b",
-    "steer_rad": r"\b(torque|rate|speed|vel\w*|moment|target|force|motor|current|rear)\b",
+    "steer_rad": r"\b(torque|rate|speed|vel\w*|moment|target|force|motor|current|rear"
+    r"|counter|cnt|crc|checksum|valid|status)\b",
     "fx_n": r"\b(fl|fr|rl|rr|brake|steer\w*)\b",
     **dict.fromkeys(
         ("east", "north", "heading", "course"),

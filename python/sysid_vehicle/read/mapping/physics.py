@@ -209,19 +209,15 @@ class _Windows:
         return all(name in self._columns for name in names)
 
     def in_units(self, factors: Mapping[str, float]) -> tuple[dict[str, FloatArray], float]:
-        """Channels times their factors, with the time, and the sampling rate.
-
-        On even times: what was left out is missing.
-        """
+        """Channels times their factors on even times, what was left out missing; their rate."""
         known = {n: f * self._columns[n] for n, f in factors.items() if n in self._columns}
         known.setdefault("ay_mps2", known["vx_mps"] * known["yaw_rate_radps"])
-        rate = self._windows.rate_hz
-        row = np.rint((self._time_s - self._time_s[0]) * rate).astype(int)
+        rate, first = self._windows.rate_hz, self._time_s[0]
+        row = np.rint((self._time_s - first) * rate).astype(int)
         even = {n: np.full(int(row[-1]) + 1, np.nan) for n in known}
         for name, values in known.items():
             even[name][row] = values
-        time_s = as_float64(self._time_s[0] + np.arange(int(row[-1]) + 1) / rate)
-        return {"time_s": time_s, **even}, rate
+        return even | {"time_s": first + np.arange(int(row[-1]) + 1) / rate}, rate
 
     def mean(self, name: str, by: str | None = None) -> FloatArray:
         values = self._columns[name] if by is None else self._columns[name] * self._columns[by]
