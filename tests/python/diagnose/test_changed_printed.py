@@ -36,6 +36,16 @@ def test_what_is_not_testable_has_no_probability(fit: Fit, course: Log, offset: 
             assert change.to_dict()["effects"][e.id]["probability"] == e.probability
 
 
+def test_what_is_large_and_not_named_is_not_said_to_be_too_small(offset: Change) -> None:
+    """A delay of 0.055 s, `seen from 0.02 s on`: a lag explains it as well."""
+    large = replace(offset.effects[0], said="not testable", probability=None)
+    assert abs(large.value[0]) > large.least[0]
+    assert "and it is larger: other changes explain the same" in large.sentence
+    small = replace(large, value=(0.5 * large.least[0],))
+    assert "larger" not in small.sentence
+    assert "larger" not in offset.effects[0].power
+
+
 def test_contradictions_of_a_text_are_found(offset: Change) -> None:
     rival = replace(offset.effects[1], said="not testable", probability=0.64)
     text = str(replace(offset, effects=(offset.effects[0], rival)))

@@ -127,7 +127,13 @@ class EffectChange:
             for n, least, u in zip(self.names, self.least, self.units, strict=True)
             if np.isfinite(least)
         ]
-        return f"seen from {', '.join(seen)} on" if seen else "no change of it would be seen"
+        if not seen:
+            return "no change of it would be seen"
+        told = f"seen from {', '.join(seen)} on"
+        large = zip(self.value, self.least, strict=True)
+        if self.named or all(abs(value) < least for value, least in large):
+            return told
+        return f"{told} by itself, and it is larger: other changes explain the same"
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
