@@ -7,13 +7,13 @@
 namespace sysid::test {
 namespace {
 
-constexpr double kSteer = 0.015, kHertz = 1.8, kDamping = 0.35;
-constexpr double kOmega = 2.0 * std::numbers::pi * kHertz;
+constexpr double kSteer = 0.015, kFollowing = 1.8, kDamped = 0.35;
+constexpr double kRate = 2.0 * std::numbers::pi * kFollowing;
 
 Parameters with_steer(const std::string& id, double steer = kSteer) {
     Parameters p = plain_parameters();
     p[parameter_of(id, 0)] = steer;
-    p[parameter_of(id, 1)] = kHertz;
+    p[parameter_of(id, 1)] = kFollowing;
     return p;
 }
 
@@ -25,15 +25,14 @@ TEST(RollSteer, AtOneInstant) {
         const std::size_t angle = state_of(id, 0), rate = state_of(id, 1);
         x[angle] = 0.5;
         x[rate] = -2.0;
-        const Pair it(id, {kSteer, kHertz}, x, kDriving);
+        const Pair it(id, {kSteer, kFollowing}, x, kDriving);
         const bool front = id == "front_roll_steer";
         EXPECT_NEAR(it.on.w.alpha_f - it.off.w.alpha_f, front ? 0.5 * kSteer : 0.0, 1e-15);
         EXPECT_NEAR(it.on.w.alpha_r - it.off.w.alpha_r, front ? 0.0 : 0.5 * kSteer, 1e-15);
         EXPECT_EQ(it.on.rate[angle], -2.0);
-        EXPECT_NEAR(
-            it.on.rate[rate],
-            kOmega * kOmega * (it.on.w.a_y / kGravity - 0.5) + 2.0 * kDamping * kOmega * 2.0,
-            1e-11);
+        EXPECT_NEAR(it.on.rate[rate],
+                    kRate * kRate * (it.on.w.a_y / kGravity - 0.5) + 2.0 * kDamped * kRate * 2.0,
+                    1e-11);
     }
 }
 

@@ -5,11 +5,11 @@
 namespace sysid::test {
 namespace {
 
-using Table = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 const auto kPlain = mask_of({"side_wind", "gyro_bias", "road_grade", "aero_drag", "mass",
                              "steer_offset", "combined_slip", "cg_position"});
-const auto kLagging =
+const auto kLate =
     kPlain | mask_of({"steer_lag", "tyre_relaxation", "steer_ratio", "steer_compliance"});
 
 /// Two runs of a car whose parameters differ from those asked about, with gaps in the data.
@@ -35,16 +35,16 @@ Problem two_runs(EffectMask effects, bool force_known = true, bool held = false)
     return problem;
 }
 
-Table sensitivities_of(const Problem& problem, const Parameters& p, const FrozenFilter& filter,
-                       const std::vector<int>& columns) {
-    Table G(static_cast<int>(problem.samples()) * kChannels, static_cast<int>(columns.size()));
+Rows sensitivities_of(const Problem& problem, const Parameters& p, const FrozenFilter& filter,
+                      const std::vector<int>& columns) {
+    Rows G(static_cast<int>(problem.samples()) * kChannels, static_cast<int>(columns.size()));
     sensitivities(problem, p.data(), filter, columns, G.data());
     return G;
 }
 
-Table signals_of(const Problem& problem, const Parameters& p, const FrozenFilter& filter,
-                 const Table& signals, const std::vector<int>& targets) {
-    Table G(static_cast<int>(problem.samples()) * kChannels, static_cast<int>(targets.size()));
+Rows signals_of(const Problem& problem, const Parameters& p, const FrozenFilter& filter,
+                const Rows& signals, const std::vector<int>& targets) {
+    Rows G(static_cast<int>(problem.samples()) * kChannels, static_cast<int>(targets.size()));
     signal_sensitivities(problem, p.data(), filter, signals.data(), targets, G.data());
     return G;
 }
@@ -63,8 +63,8 @@ int column_of(const std::string& effect, std::size_t which = 0) {
 
 TEST(PredictionError, ResidualsAreTheFiltersWhitenedInnovations) {
     for (const auto& [effects, noise] :
-         {std::pair{kPlain, ordinary_noise()}, std::pair{kLagging, ordinary_noise()},
-          std::pair{kPlain, sloping_noise()}, std::pair{kLagging, sloping_noise()}}) {
+         {std::pair{kPlain, ordinary_noise()}, std::pair{kLate, ordinary_noise()},
+          std::pair{kPlain, sloping_noise()}, std::pair{kLate, sloping_noise()}}) {
         const Problem problem = two_runs(effects);
         const Parameters p = typical_parameters();
         const FrozenFilter filter = freeze(problem, p.data(), noise);
@@ -95,7 +95,7 @@ TEST(PredictionError, DisturbancesThatAreNotThereChangeNothing) {
     Noise small = none;
     small.disturbance = {1e-7, 1e-7, 1e-7};
     ASSERT_TRUE(none.white() && !small.white());
-    for (const EffectMask effects : {kPlain, kLagging}) {
+    for (const EffectMask effects : {kPlain, kLate}) {
         const Problem problem = two_runs(effects);
         const FrozenFilter three = freeze(problem, p.data(), none);
         const FrozenFilter six = freeze(problem, p.data(), small);
@@ -142,7 +142,7 @@ struct Case {
 };
 class Sensitivities : public testing::TestWithParam<Case> {};
 INSTANTIATE_TEST_SUITE_P(Models, Sensitivities,
-                         testing::Values(Case{"Motion", kPlain}, Case{"Lagging", kLagging},
+                         testing::Values(Case{"Motion", kPlain}, Case{"Lagging", kLate},
                                          Case{"MotionByAcceleration", kPlain, false},
                                          Case{"All", kAllEffects},
                                          Case{"HeldWithLoads", kPlain, true, true}),
@@ -158,7 +158,7 @@ TEST_P(Sensitivities, AreTheDerivativesOfTheResiduals) {
         p[static_cast<std::size_t>(i)] *= 1.03;
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
     const std::vector<int> columns = all_columns();
-    const Table G = sensitivities_of(problem, p, filter, columns);
+    const Rows G = sensitivities_of(problem, p, filter, columns);
     ASSERT_TRUE(G.allFinite());
     int moved = 0;
     for (int i : columns) {
@@ -180,18 +180,18 @@ TEST_P(Sensitivities, AreTheDerivativesOfTheResiduals) {
 }
 
 TEST(PredictionError, ColumnsDoNotDependOnTheirCompany) {
-    const Problem problem = two_runs(kLagging);
+    const Problem problem = two_runs(kLate);
     const Parameters p = typical_parameters();
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
-    const Table all = sensitivities_of(problem, p, filter, all_columns());
+    const Rows all = sensitivities_of(problem, p, filter, all_columns());
     const std::vector<int> some{column_of("steer_lag"), kDRear, column_of("side_wind", 1)};
-    const Table few = sensitivities_of(problem, p, filter, some);
+    const Rows few = sensitivities_of(problem, p, filter, some);
     for (std::size_t j = 0; j < some.size(); ++j)
         EXPECT_EQ((few.col(static_cast<int>(j)) - all.col(some[j])).norm(), 0.0);
 }
 
 TEST(PredictionError, NormalEquationsAreProducts) {
-    const Problem problem = two_runs(kLagging);
+    const Problem problem = two_runs(kLate);
     const Parameters p = typical_parameters();
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
     const std::vector<int> columns{kBFront,
@@ -206,11 +206,11 @@ TEST(PredictionError, NormalEquationsAreProducts) {
                                    column_of("cg_position")};
     const auto n = static_cast<int>(columns.size());
     Eigen::VectorXd gradient(n);
-    Table information(n, n);
+    Rows information(n, n);
     const double cost =
         normal_equations(problem, p.data(), filter, columns, gradient.data(), information.data());
     const Eigen::VectorXd e = residuals_of(problem, p, filter);
-    const Table G = sensitivities_of(problem, p, filter, columns);
+    const Rows G = sensitivities_of(problem, p, filter, columns);
     EXPECT_NEAR(cost, 0.5 * e.squaredNorm(), 1e-12 * cost);
     EXPECT_LT((gradient - G.transpose() * e).norm(), 1e-10 * gradient.norm());
     EXPECT_LT((information - G.transpose() * G).norm(), 1e-12 * information.norm());
@@ -226,16 +226,16 @@ TEST(PredictionError, NormalEquationsAreProducts) {
 }
 
 TEST(PredictionError, ConstantSignalsAnswerLikeTheEffectsThatAreConstant) {
-    const Problem problem = two_runs(kLagging);
+    const Problem problem = two_runs(kLate);
     const Parameters p = typical_parameters();
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
     const std::vector<int> targets{kForceY, kMomentZ, kGravityX,
                                    kExternals + static_cast<int>(kYawRate)};
-    const Table ones = Table::Ones(static_cast<int>(problem.samples()), 4);
-    const Table answers = signals_of(problem, p, filter, ones, targets);
-    const Table G = sensitivities_of(problem, p, filter,
-                                     {column_of("side_wind", 0), column_of("side_wind", 1),
-                                      column_of("road_grade"), column_of("gyro_bias")});
+    const Rows ones = Rows::Ones(static_cast<int>(problem.samples()), 4);
+    const Rows answers = signals_of(problem, p, filter, ones, targets);
+    const Rows G = sensitivities_of(problem, p, filter,
+                                    {column_of("side_wind", 0), column_of("side_wind", 1),
+                                     column_of("road_grade"), column_of("gyro_bias")});
     const double slope = -kGravity * std::cos(p[parameter_of("road_grade")]);
     const std::array<double, 4> factor{1.0, 1.0, slope, 1.0};
     for (int j = 0; j < 4; ++j) {
@@ -254,7 +254,7 @@ TEST(PredictionError, SignalOnAReadingIsTakenOffTheMeasurement) {
     const auto n = static_cast<int>(problem.samples());
     std::vector<int> targets;
     for (int j = 0; j < 10; ++j) targets.push_back(kExternals + j % kChannels);
-    Table signals(n, 10);
+    Rows signals(n, 10);
     for (int k = 0; k < n; ++k)
         for (int j = 0; j < 10; ++j) signals(k, j) = 1e-3 * std::sin(0.1 * (j + 1) * k + j);
     int first = 0;
@@ -262,7 +262,7 @@ TEST(PredictionError, SignalOnAReadingIsTakenOffTheMeasurement) {
         signals.row(first).setZero();  // the start of the state is read off the first sample
         first += static_cast<int>(run.size());
     }
-    const Table answers = signals_of(problem, p, filter, signals, targets);
+    const Rows answers = signals_of(problem, p, filter, signals, targets);
     for (int j = 0; j < 10; ++j) {
         // A reading expected higher by s leaves the same error as a measurement lower by s.
         const auto residuals_lowered = [&](double sign) {

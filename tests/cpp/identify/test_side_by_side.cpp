@@ -200,13 +200,13 @@ TEST(Pieces, WaitUntilAForceIsToldFromTheSlopeOfTheRoad) {
     EXPECT_NEAR(forgets_s(problem, noise) * std::sqrt(zero) / -std::log(kMet), 1.0, 1e-3);
 }
 
-struct Score {
+struct WholeScore {
     double value;
     Vec<kNoiseParameters> gradient;
     Mat<kNoiseParameters, kNoiseParameters> information;
 };
-Score score_of(const Problem& problem, const Noise& noise) {
-    Score out;
+WholeScore score_of(const Problem& problem, const Noise& noise) {
+    WholeScore out;
     out.value = noise_score(problem, typical_parameters().data(), noise, out.gradient.data(),
                             out.information.data());
     return out;
@@ -217,10 +217,10 @@ TEST_P(SideBySide, NoiseScoresOfRunsAddUp) {
         for (const Noise& noise : {ordinary_noise(), sloping_noise()}) {
             Problem problem = long_run(effects, 130);
             ASSERT_TRUE(pieces_of(problem.runs).empty());
-            const Score one = score_of(problem, noise);
+            const WholeScore one = score_of(problem, noise);
             problem.runs.resize(16, problem.runs[0]);
             ASSERT_EQ(pieces_of(problem.runs).size(), 16U);
-            const Score all = score_of(problem, noise);
+            const WholeScore all = score_of(problem, noise);
             EXPECT_NEAR(all.value, 16.0 * one.value, 1e-12 * std::abs(all.value));
             EXPECT_LT((all.gradient - 16.0 * one.gradient).norm(), 1e-11 * all.gradient.norm());
             EXPECT_LT((all.information - 16.0 * one.information).norm(),
@@ -265,8 +265,8 @@ TEST(SideBySideToo, NoiseScoreOfPiecesIsThatOfTheWholeRun) {
     const Problem quick = long_run(kLagging), slow = without_speed(quick);
     Problem both = quick;  // all in one go, for the sake of the second run
     both.runs.push_back(slow.runs[0]);
-    const Score pieces = score_of(quick, noise), rest = score_of(slow, noise);
-    const Score whole = score_of(both, noise);
+    const WholeScore pieces = score_of(quick, noise), rest = score_of(slow, noise);
+    const WholeScore whole = score_of(both, noise);
     EXPECT_NEAR(pieces.value + rest.value, whole.value, 1e-11 * std::abs(whole.value));
     EXPECT_LT((pieces.gradient + rest.gradient - whole.gradient).norm(),
               1e-10 * pieces.gradient.norm());
@@ -318,8 +318,8 @@ TEST(SideBySideToo, AForceMakesTheFilterForgetWhereNoWhiteNoiseDoes) {
         EXPECT_LT((pieces.slope + rest.slope - whole.slope).norm(), 1e-10 * whole.slope.norm());
         EXPECT_LT((pieces.information + rest.information - whole.information).norm(),
                   1e-10 * whole.information.norm());
-        const Score score = score_of(quick, noise), left = score_of(slow, noise);
-        const Score all = score_of(both, noise);
+        const WholeScore score = score_of(quick, noise), left = score_of(slow, noise);
+        const WholeScore all = score_of(both, noise);
         EXPECT_NEAR(score.value + left.value, all.value, 1e-11 * std::abs(all.value));
         EXPECT_LT((score.gradient + left.gradient - all.gradient).norm(),
                   1e-10 * all.gradient.norm());

@@ -6,9 +6,9 @@
 namespace sysid::test {
 namespace {
 
-constexpr double kClose = 2e-11;  // of whitened residuals
+constexpr double kSame = 2e-11;  // of whitened residuals
 
-const auto kLagging = mask_of({"tyre_relaxation", "steer_lag", "aero_drag"});
+const auto kLagAndDrag = mask_of({"tyre_relaxation", "steer_lag", "aero_drag"});
 
 Problem runs_of(EffectMask effects, std::size_t samples) {
     const SingleTrack truth{saloon(), effects};
@@ -39,7 +39,7 @@ Linear linear_of(const Problem& problem, const Parameters& p, const FrozenFilter
 
 TEST(Told, PathIsThatOfAWalk) {
     const Parameters p = typical_parameters();
-    for (const EffectMask effects : {EffectMask{0}, kLagging})
+    for (const EffectMask effects : {EffectMask{0}, kLagAndDrag})
         for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()})
             for (const std::size_t samples : {120U, 2400U}) {
                 const Problem problem = runs_of(effects, samples);
@@ -47,7 +47,7 @@ TEST(Told, PathIsThatOfAWalk) {
                 ASSERT_TRUE(filter.made_of.is(problem, p.data()));
                 const Eigen::VectorXd told = residuals_of(problem, p, filter);
                 const Eigen::VectorXd walked = residuals_of(problem, p, silent(filter));
-                EXPECT_LT(apart(told, walked), kClose);
+                EXPECT_LT(apart(told, walked), kSame);
                 EXPECT_NE(told, walked);  // other roundings
                 const Linear one = linear_of(problem, p, filter);
                 const Linear other = linear_of(problem, p, silent(filter));
@@ -66,7 +66,7 @@ TEST(Told, IsWhereOthersBegin) {
         p[kBFront] *= 1.0 + more;
         p[kYawInertia] *= 1.0 + more;
         EXPECT_LT(apart(residuals_of(problem, p, filter), residuals_of(problem, p, silent(filter))),
-                  kClose);
+                  kSame);
     }
 }
 
@@ -132,7 +132,7 @@ TEST(Told, WhereRoundingMayCountTheFilterIsTheCarefulOne) {
 
 TEST(Told, TraceIsThatOfTheFilter) {
     const Parameters p = typical_parameters();
-    for (const EffectMask effects : {EffectMask{0}, kLagging})
+    for (const EffectMask effects : {EffectMask{0}, kLagAndDrag})
         for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()}) {
             const Problem problem = runs_of(effects, 240);
             const FrozenFilter filter = freeze(problem, p.data(), noise);

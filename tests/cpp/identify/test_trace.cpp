@@ -7,7 +7,7 @@
 namespace sysid::test {
 namespace {
 
-const auto kLagging = mask_of({"steer_lag", "tyre_relaxation"});
+const auto kTwoLags = mask_of({"steer_lag", "tyre_relaxation"});
 
 Problem one_run(EffectMask effects) {
     const SingleTrack model{saloon(), effects};
@@ -17,7 +17,7 @@ Problem one_run(EffectMask effects) {
 }
 
 TEST(Trace, SmoothingGainsCertaintyAndKeepsTheEnd) {
-    for (EffectMask effects : {EffectMask{0}, kLagging}) {
+    for (EffectMask effects : {EffectMask{0}, kTwoLags}) {
         const Problem problem = one_run(effects);
         const Parameters p = typical_parameters();
         const Trace filtered = trace(problem, p.data(), ordinary_noise(), false);
@@ -68,7 +68,7 @@ TEST(Trace, FirstWhitenedElementIsInnovationOverSpread) {
 }
 
 TEST(LookAhead, PerfectModelAndDataLeaveNoError) {
-    for (EffectMask effects : {EffectMask{0}, kLagging}) {
+    for (EffectMask effects : {EffectMask{0}, kTwoLags}) {
         const SingleTrack model{saloon(), effects};
         const Parameters p = typical_parameters();
         Problem problem{model, {}};

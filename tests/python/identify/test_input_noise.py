@@ -22,13 +22,13 @@ def log(effect: str, steer_rad: float) -> sv.Log:
     return sv.drive(late(effect), sv.manoeuvres.lap(), seed=71, noise=noise)
 
 
-def both(log: sv.Log) -> dict[str, Fit]:
+def fitted(log: sv.Log, *effects: str) -> dict[str, Fit]:
     base = sv.identify(start(), log, starts=1)
-    return {e: refine(late(e), base.driving, base.noise) for e in TWO}
+    return {e: refine(late(e), base.driving, base.noise) for e in effects}
 
 
 def test_a_lag_is_likelier_than_the_delay_that_is_there_and_not_with_exact_inputs() -> None:
-    noisy, clean = (both(log("steer_delay", std)) for std in (2e-4, 0.0))
+    noisy, clean = (fitted(log("steer_delay", std), *TWO) for std in (2e-4, 0.0))
     delay, lag = (noisy[e] for e in TWO)
     assert lag.log_likelihood > delay.log_likelihood + 5.0
     assert with_exact_inputs(delay) > with_exact_inputs(lag)
@@ -40,7 +40,7 @@ def test_a_lag_is_likelier_than_the_delay_that_is_there_and_not_with_exact_input
 
 def test_exact_inputs_take_nothing() -> None:
     # Drive and brake follow the curves of the manoeuvre, with no noise of their own.
-    fit = both(log("steer_lag", 0.0))["steer_lag"]
+    fit = fitted(log("steer_lag", 0.0), "steer_lag")["steer_lag"]
     assert lost_to_input_noise(fit, fit.driving) < 0.5
     assert with_exact_inputs(fit) == pytest.approx(fit.log_likelihood, abs=0.5)
 

@@ -13,6 +13,7 @@ from sysid_vehicle.online import (
     estimate_sideslip,
     fitted_vehicle,
 )
+from sysid_vehicle.online.sideslip_calibration import _score as log_density
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +78,20 @@ def test_the_band_does_not_answer_for_noise_of_the_measured_sideslip(vehicle, lo
     assert "of it noise of the measured one" in str(run)
     truth = np.arctan2(log["vy_mps"], log["vx_mps"])
     assert run.error(truth) == dataclasses.replace(exact, noise_deg=0.0)
+
+
+def test_what_a_calibration_maximises_answers_for_no_noise_of_the_measured(vehicle, log, noisy):
+    """The band that scores best is no wider than by exact sideslip."""
+    wider = np.geomspace(0.05, 5.0, 47)
+
+    def best(measured):
+        run = estimate_sideslip(vehicle, measured.between(0.0, 20.0), judge=False)
+        bands = [dataclasses.replace(run, beta_std_rad=w * run.beta_std_rad) for w in wider]
+        return wider[np.argmax([log_density(band) for band in bands])]
+
+    exact = best(log)
+    assert wider[0] < exact < wider[-1]
+    assert best(noisy) < 1.2 * exact
 
 
 def test_a_calibration_does_not_learn_the_noise_of_the_measured_sideslip(vehicle, log, noisy):
