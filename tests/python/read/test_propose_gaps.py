@@ -63,3 +63,15 @@ def test_a_map_without_a_pull_says_so(
 def test_usual_names_are_known(driven: dict[str, np.ndarray], name: str, channel: str) -> None:
     columns = {name if n == NAMES[channel] else n: v for n, v in driven.items()}
     assert sv.propose_channels(columns).channels[channel].column == name
+
+
+@pytest.mark.parametrize("set_by_s", [3.0e4, 1.8e9])
+def test_a_clock_that_is_set_while_it_records_is_a_gap(
+    driven: dict[str, np.ndarray], set_by_s: float
+) -> None:
+    """Times were filled up from the year 1970 on."""
+    late = driven["time"] > 25.0
+    columns = driven | {"time": np.where(late, set_by_s + driven["time"], driven["time"])}
+    found = sv.propose_channels(columns, vehicle=CAR).channels
+    as_it_was = sv.propose_channels(driven, vehicle=CAR).channels
+    assert {n: c.factor for n, c in found.items()} == {n: c.factor for n, c in as_it_was.items()}

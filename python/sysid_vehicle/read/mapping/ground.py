@@ -255,10 +255,13 @@ def turns_of(
         return np.nan
     t, r = time_s[known], yaw_rate[known]
     turned = np.concatenate(([0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))))
-    ticks = np.arange(t[0], t[-1], _WINDOW_S)
+    _, begins = np.unique(np.floor((t - t[0]) / _WINDOW_S), return_index=True)
+    ticks = t[begins]
+    step = np.diff(ticks)
+    no_gap = step <= _GAP * np.median(step)
     fast = np.interp(ticks, time_s[moving], speed[moving]) > _slowest(speed[moving])
     by_rate, by_heading = (
-        np.diff(np.interp(ticks, at_s, angle))[fast[1:] & fast[:-1]]
+        np.diff(np.interp(ticks, at_s, angle))[fast[1:] & fast[:-1] & no_gap]
         for at_s, angle in ((t, turned), (time_s[at], heading[at]))
     )
     total = float(by_rate @ by_rate)

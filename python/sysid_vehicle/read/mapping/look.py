@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from ..._common.arrays import FloatArray
+from ..._common.arrays import FloatArray, as_float64
 from ...log import CHANNELS, standing
 from ..recording import Recording
 from ..table import Table
@@ -108,7 +108,7 @@ def even(
 ) -> tuple[FloatArray, dict[str, FloatArray]] | None:
     """The channels on common even times, to look at: interpolated, for nothing else.
 
-    Times of gaps are left out: what lies between is no driving.
+    Times of gaps are left out, however long: what lies between is no driving.
     """
     known = {}
     for channel, (clock, values) in held.items():
@@ -122,11 +122,39 @@ def even(
     end = min(float(t[-1]) for t, _ in known.values())
     if (end - begin) * _RATE_HZ < _FEWEST:
         return None
-    time_s = np.arange(begin, end, 1.0 / _RATE_HZ)
-    for clock, _ in known.values():
-        step = np.diff(clock)
-        for i in np.flatnonzero(step > max(_GAP_S, _GAP_PERIODS * float(np.median(step)))):
-            time_s = time_s[(time_s <= clock[i]) | (time_s >= clock[i + 1])]
+    time_s = _driven(begin, end, [clock for clock, _ in known.values()])
     if time_s.size < _FEWEST:
         return None
     return time_s, {c: np.interp(time_s, t, values) for c, (t, values) in known.items()}
+
+
+def with_gaps(
+    time_s: FloatArray, channels: Mapping[str, FloatArray], rate_hz: float
+) -> dict[str, FloatArray]:
+    """The channels that `even` gave with all times, a second of each gap, where they are NaN."""
+    steps = np.minimum(np.diff(time_s), _GAP_S)
+    row = np.rint(np.cumsum([0.0, *steps]) * rate_hz).astype(int)
+    whole = {"time_s": as_float64(time_s[0] + np.arange(row[-1] + 1) / rate_hz)}
+    for name, values in channels.items():
+        whole[name] = np.full(row[-1] + 1, np.nan)
+        whole[name][row] = values
+    return whole
+
+
+def _driven(begin: float, end: float, clocks: Iterable[FloatArray]) -> FloatArray:
+    """Even times from `begin` to `end`, without those between two ends of a gap."""
+    parts, at = [], begin
+    for last, first in sorted({gap for clock in clocks for gap in _gaps(clock)}):
+        if last >= at:
+            parts.append((at, min(last, end)))
+        at = max(at, first)
+    parts.append((at, end))
+    grids = [(np.ceil((a - begin) * _RATE_HZ), (b - begin) * _RATE_HZ) for a, b in parts if a < b]
+    whole = [np.arange(first, last) for first, last in grids]
+    return as_float64(begin + np.concatenate([np.zeros(0), *whole]) / _RATE_HZ)
+
+
+def _gaps(clock: FloatArray) -> list[tuple[float, float]]:
+    step = np.diff(clock)
+    wide = np.flatnonzero(step > max(_GAP_S, _GAP_PERIODS * float(np.median(step))))
+    return [(float(clock[i]), float(clock[i + 1])) for i in wide]

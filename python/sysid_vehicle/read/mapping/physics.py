@@ -19,6 +19,7 @@ from ...log import times_wheelbase
 from ...log.laws.laws import LINEAR_MPS2, cosine, fit
 from ...log.laws.motion import Windows
 from ...vehicle import GRAVITY_MPS2
+from .look import with_gaps
 from .sideslip import against_the_rear_axle, usual_sideslip
 
 _DEG, _G = math.pi / 180.0, GRAVITY_MPS2
@@ -209,15 +210,10 @@ class _Windows:
         return all(name in self._columns for name in names)
 
     def in_units(self, factors: Mapping[str, float]) -> tuple[dict[str, FloatArray], float]:
-        """Channels times their factors on even times, what was left out missing; their rate."""
+        """Channels times their factors with their times, gaps as missing, and their rate."""
         known = {n: f * self._columns[n] for n, f in factors.items() if n in self._columns}
         known.setdefault("ay_mps2", known["vx_mps"] * known["yaw_rate_radps"])
-        rate, first = self._windows.rate_hz, self._time_s[0]
-        row = np.rint((self._time_s - first) * rate).astype(int)
-        even = {n: np.full(int(row[-1]) + 1, np.nan) for n in known}
-        for name, values in known.items():
-            even[name][row] = values
-        return even | {"time_s": first + np.arange(int(row[-1]) + 1) / rate}, rate
+        return with_gaps(self._time_s, known, self._windows.rate_hz), self._windows.rate_hz
 
     def mean(self, name: str, by: str | None = None) -> FloatArray:
         values = self._columns[name] if by is None else self._columns[name] * self._columns[by]
