@@ -28,8 +28,9 @@ KERNELS = (
     "trace",
 )
 
-# Once the time is over: one scoring of all effects, and errors of two models on two data sets.
-PASSES = 25
+# Once the time is over: one scoring of all effects, errors of two models on two data sets, and what
+# noise of the inputs has added to scores and to the test of all that is left, drawn twice.
+PASSES = 25 + 17
 
 # What is told once the time is over: errors ahead, maps, residuals.
 TOLD = 40

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ... import _core
+from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import Workers, check_time
 from ...errors import InvalidInput
-from ...estimate import Driving
+from ...estimate import Driving, again, noisier
 from ...estimate.leads import Part, Work
 from ...estimate.pieces import DrivingProblem, PiecewiseProblem
 from ...identify import Fit, driving_of
@@ -107,6 +108,20 @@ class Evidence:
     def residual(self) -> FloatArray:
         """Whitened residuals, sample by sample, channel by channel, shape (5 n,)."""
         return self.problem.residuals(self.fit.model.vector(), self.frozen).ravel()
+
+    @cached_property
+    def noisier(self) -> tuple[tuple[Evidence, FloatArray], ...]:
+        """The same with as much noise of the inputs once more, and that noise, shape (n, 2).
+
+        Drawn twice, with the same gains.
+        """
+        rng = generator(0)
+        inputs = self.driving.inputs() if self.inputs is None else self.inputs
+        drawn = (again(self.driving, rng) for _ in range(2))
+        return tuple(
+            (replace(self, inputs=noisier(self.driving, inputs, n), gains=self.frozen), n)
+            for n in drawn
+        )
 
     @cached_property
     def filtered(self) -> FloatArray:

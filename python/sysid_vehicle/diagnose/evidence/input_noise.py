@@ -9,13 +9,10 @@ by as much as it has changed already (simulation and extrapolation, Cook & Stefa
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
-from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
-from ...estimate import again, noisier
 from .directions import Columns
 from .evidence import Evidence
 
@@ -37,29 +34,21 @@ def added_by_input_noise(evidence: Evidence, columns: Columns, noisier_ones: Noi
     noisier_ones : callable
         Makes the same columns of noisier evidence.
     """
-    rng = generator(0)
-    one, other = (_added(evidence, columns, noisier_ones, rng) for _ in range(2))
-    return as_float64(0.5 * (one + other))
-
-
-def _added(
-    evidence: Evidence, columns: Columns, noisier_ones: Noisier, rng: np.random.Generator
-) -> FloatArray:
-    driving = evidence.driving
-    inputs = driving.inputs() if evidence.inputs is None else evidence.inputs
-    noise = again(driving, rng)
-    noisy = replace(evidence, inputs=noisier(driving, inputs, noise), gains=evidence.frozen)
-    other = noisier_ones(noisy, noise)
+    noisy = [one for one, _ in evidence.noisier]
+    others = [noisier_ones(one, noise) for one, noise in evidence.noisier]
     free = len(evidence.fit.model.free_names)
     square, across = np.zeros((free, free)), np.zeros((free, columns.width))
     own, product = np.zeros(free), np.zeros(columns.width)
-    for section, moved in zip(evidence.sections(), noisy.sections(), strict=True):
-        change = moved.residual - section.residual
+    for section, *moved in zip(
+        evidence.sections(), *(one.sections() for one in noisy), strict=True
+    ):
         G, F = columns.of(section), section.fitted
         square += F.T @ F
         across += F.T @ G
-        product += (other.of(moved) - G).T @ change
-        own += (moved.fitted - F).T @ change
+        for other, after in zip(others, moved, strict=True):
+            change = (after.residual - section.residual) / len(noisy)
+            product += (other.of(after) - G).T @ change
+            own += (after.fitted - F).T @ change
     scale = np.sqrt(np.maximum(np.diag(square), 1e-300))
     copied = np.linalg.lstsq(square / np.outer(scale, scale), across / scale[:, None], rcond=None)
     return as_float64(product - (own / scale) @ copied[0])
