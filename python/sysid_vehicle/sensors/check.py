@@ -156,9 +156,8 @@ def checked(
             names = [fault.name for fault in faults if fault.found]
             rivals = {without: against(found, lacks.union(without)) for without in doubted(names)}
             doubts = dict(rivals)
-            if (
-                may_swing
-            ):  # a body that swings takes the place of a fault, too, where it is likelier
+            # A body that swings takes the place of a fault, too, where it is likelier.
+            if may_swing:
                 swung = {without: against(found, frozenset(without)) for without in rivals}
                 doubts |= {without: rival for without, rival in swung.items() if rival.worse < 0.0}
             faults = told_of(found, parts=parts, rivals=doubts)
