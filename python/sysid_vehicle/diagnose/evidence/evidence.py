@@ -113,11 +113,11 @@ class Evidence:
     def noisier(self) -> tuple[tuple[Evidence, FloatArray], ...]:
         """The same with as much noise of the inputs once more, and that noise, shape (n, 2).
 
-        Drawn twice, with the same gains.
+        Drawn twice, with the same gains; once for long driving, over which it averages out.
         """
         rng = generator(0)
         inputs = self.driving.inputs() if self.inputs is None else self.inputs
-        drawn = (again(self.driving, rng) for _ in range(2))
+        drawn = (again(self.driving, rng) for _ in range(1 if self.driving.samples > HELD else 2))
         return tuple(
             (replace(self, inputs=noisier(self.driving, inputs, n), gains=self.frozen), n)
             for n in drawn
