@@ -40,7 +40,7 @@ def test_what_is_large_and_not_named_is_not_said_to_be_too_small(offset: Change)
     """A delay of 0.055 s, `seen from 0.02 s on`: a lag explains it as well."""
     large = replace(offset.effects[0], said="not testable", probability=None)
     assert abs(large.value[0]) > large.least[0]
-    assert "and it is larger: other changes explain the same" in large.sentence
+    assert "it is larger, and not shown beside what else may have changed" in large.sentence
     small = replace(large, value=(0.5 * large.least[0],))
     assert "larger" not in small.sentence
     assert "larger" not in offset.effects[0].power

@@ -133,7 +133,7 @@ class EffectChange:
         large = zip(self.value, self.least, strict=True)
         if self.named or all(abs(value) < least for value, least in large):
             return told
-        return f"{told} by itself, and it is larger: other changes explain the same"
+        return f"{told} by itself; it is larger, and not shown beside what else may have changed"
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""

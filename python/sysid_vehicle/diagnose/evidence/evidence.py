@@ -113,7 +113,7 @@ class Evidence:
     def noisier(self) -> tuple[tuple[Evidence, FloatArray], ...]:
         """The same with as much noise of the inputs once more, and that noise, shape (n, 2).
 
-        Drawn twice, with the same gains; once for long driving, over which it averages out.
+        Drawn twice, with the same gains; once for long driving, which holds many samples of it.
         """
         rng = generator(0)
         inputs = self.driving.inputs() if self.inputs is None else self.inputs
