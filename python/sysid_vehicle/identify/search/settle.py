@@ -73,7 +73,8 @@ def risen(
     least = objective.reached(p, gains)
     begin = p[box.columns]
     for share in _SHARES:
-        trial = box.put(p, begin + share * (x - begin))
+        # Rounding may lead beyond a bound.
+        trial = box.inside(box.put(p, begin + share * (x - begin)))
         try:
             there = objective.freeze(trial, noise)
         except NumericalError:
