@@ -116,12 +116,13 @@ class Evidence:
         Drawn twice, with the same gains; once for long driving, which holds many samples of it.
         """
         rng = generator(0)
-        inputs = self.driving.inputs() if self.inputs is None else self.inputs
         drawn = (again(self.driving, rng) for _ in range(1 if self.driving.samples > HELD else 2))
-        return tuple(
-            (replace(self, inputs=noisier(self.driving, inputs, n), gains=self.frozen), n)
-            for n in drawn
-        )
+        return tuple((self.with_input_noise(n), n) for n in drawn)
+
+    def with_input_noise(self, noise: FloatArray) -> Evidence:
+        """The same gains and noisier inputs; noise of the measured ones, shape (n, 2)."""
+        inputs = self.driving.inputs() if self.inputs is None else self.inputs
+        return replace(self, inputs=noisier(self.driving, inputs, noise), gains=self.frozen)
 
     @cached_property
     def filtered(self) -> FloatArray:

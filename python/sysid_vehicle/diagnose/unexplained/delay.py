@@ -27,7 +27,7 @@ import scipy
 
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import HALF_95
-from ...estimate import again, noisier
+from ...estimate import again
 from ...estimate.driving import Span
 from ...identify import refine, refit, relearn
 from ..evidence.evidence import Evidence, solve
@@ -144,7 +144,7 @@ def delay(
         direction, step, std = _later(evidence, late, which)
     total = put_in + step
     arrived = evidence is first or (not beyond and _arrived(step, std))
-    std = float(np.hypot(std, std**2 * _by_input_noise(evidence, late, direction, rng)))
+    std = float(np.hypot(std, std**2 * _by_input_noise(evidence, direction, rng)))
     if not arrived:
         # Where the search would end is not known any closer.
         std = float(np.linalg.norm([std, step, beyond]))
@@ -185,24 +185,16 @@ def _later(evidence: Evidence, inputs: FloatArray, which: int) -> tuple[FloatArr
     return R[:, 0], float(found.size[0]), float(np.sqrt(found.covariance[0, 0]))
 
 
-def _by_input_noise(
-    evidence: Evidence,
-    inputs: FloatArray,
-    direction: FloatArray,
-    rng: np.random.Generator,
-) -> float:
+def _by_input_noise(evidence: Evidence, direction: FloatArray, rng: np.random.Generator) -> float:
     """Scatter of the score along a direction that comes from noise of the measured inputs.
 
     What `quiet` leaves of it is slow, and to the noise model, which knows white noise only, it
     looks smaller than it is.
     """
-    driving, p = evidence.driving, evidence.fit.model.vector()
     scores = []
     for _ in range(_DRAWS):
-        noisy = noisier(driving, inputs, again(driving, rng))
-        problem = driving.problem(evidence.fit.model, other_inputs=noisy)
-        change = evidence.residual - problem.residuals(p, evidence.frozen).ravel()
-        scores.append(float(direction @ change))
+        noisy = evidence.with_input_noise(again(evidence.driving, rng))
+        scores.append(float(direction @ (noisy.residual - evidence.residual)))
     return float(np.sqrt(np.mean(np.square(scores))))
 
 
