@@ -29,7 +29,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from counts import Row, table
-from pairs import KINDS, Pair, Truth, drawn
+from pairs import ASKED, Pair, Truth, drawn
 
 import sysid_vehicle as sv
 
@@ -113,7 +113,7 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=40)
     parser.add_argument("--unchanged", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="number of the first pair")
-    parser.add_argument("--kind", choices=KINDS, default="", help="of all pairs")
+    parser.add_argument("--kind", choices=ASKED, default="", help="of all pairs")
     parser.add_argument("--json", type=Path, metavar="FILE", help="a line for each pair")
     parser.add_argument("--read", nargs="+", type=Path, metavar="FILE")
     args = parser.parse_args()

@@ -24,6 +24,9 @@ KINDS = (
 )
 """What may change: `grip` is all side force of both axles, `friction` what they reach at most."""
 
+ASKED = (*KINDS, "steering delay", "yaw inertia")
+"""With those that are not drawn, but made where they are asked for."""
+
 _RATE_HZ = 50.0
 _SECONDS = 40.0
 _EASIER = (1.0, 0.85, 0.7, 0.55, 0.4)
@@ -196,6 +199,10 @@ def _changed(car: sv.Model, what: str, rng: np.random.Generator, truths: list[Tr
         return model.with_values({name: model.value(name) + by})
     if what == "steer ratio":
         return shifted("steer_ratio.ratio_error", 0.03 * sign)
+    if what == "steering delay":
+        return shifted("steer_delay.delay_s", rng.uniform(0.03, 0.07))
+    if what == "yaw inertia":
+        return shifted("yaw_inertia.relative_error", sign * rng.uniform(0.15, 0.3))
     return car
 
 

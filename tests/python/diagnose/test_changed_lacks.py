@@ -90,4 +90,17 @@ def test_a_rival_that_is_nothing_beside_an_effect_does_not_take_its_place() -> N
     for nothing, first in (({"steer_compliance"}, "tyre_front"), (set(both), "steer_compliance")):
         said._off_nothing = lambda e, *_, nothing=nothing: e not in nothing
         odds = {"tyre_front": 0.0, "steer_compliance": 24.0}
-        assert said._told_apart("tyre_front", odds, state).effects == (first,)
+        assert said._told_apart("tyre_front", odds, state, 1.0).effects == (first,)
+
+
+@pytest.mark.parametrize("gain", [1.0, 30.0])
+def test_where_the_likelihood_does_as_well_without_an_effect_its_rival_stays(gain: float) -> None:
+    """Of a lag and a delay that do the same, lines lean to the one that filters noise of inputs."""
+    put = {("steer_lag", "steer_delay"): gain, ("steer_delay",): 0.0}
+    said = cast(Any, Saying.__new__(Saying))
+    visited = {frozenset(p): SimpleNamespace(log_likelihood=v) for p, v in put.items()}
+    said.search = SimpleNamespace(visited=visited, told=lambda _: None, rules=USUAL)
+    said._off_nothing = lambda e, *_: e == "steer_lag"
+    state = cast(Any, SimpleNamespace(put=("steer_lag",)))
+    found = said._told_apart("steer_lag", {"steer_lag": 0.0, "steer_delay": -0.3}, state, 3.0)
+    assert ("steer_delay" in found.effects) is (gain < 3.0 * USUAL.told)

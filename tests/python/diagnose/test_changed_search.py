@@ -23,33 +23,56 @@ class Told:
         return self._p_values[effect]
 
 
-def test_what_is_named_was_put_in_and_is_off_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A likelier rival takes the place of what was put in; what no line tells goes."""
-    lines = {"steer_lag": 1e-9, "steer_delay": 1e-9, "mass": 0.3}
-    sets = [(), ("steer_lag", "mass"), ("steer_delay", "mass"), ("steer_delay",)]
+def searching(
+    monkeypatch: pytest.MonkeyPatch,
+    lines: dict[str, float],
+    evidence: dict[tuple[str, ...], float],
+) -> Search:
+    """A search that has visited all of the evidence, and climbed where there are several."""
     search = Search.__new__(Search)
     search.rules, search.tyres = USUAL, ()
     search.can = {e: SimpleNamespace() for e in lines}  # type: ignore[misc]
     search.visited = {
         frozenset(p): SimpleNamespace(put=p, changes={}, among=0.0, climbed=len(p) > 1)  # type: ignore[misc]
-        for p in sets
+        for p in evidence
     }
     search.start = None  # type: ignore[assignment]
     search.reference = SimpleNamespace(  # type: ignore[assignment]
         climbed=lambda _, s: SimpleNamespace(put=s.put, changes={}, climbed=True)
     )
-    likelier = search.visited[frozenset(sets[2])]
     monkeypatch.setattr(search, "told", lambda state: Told(state.put, lines))
     monkeypatch.setattr(search, "_leading", lambda _, state: state.put)
-    monkeypatch.setattr(search, "evidence", lambda state, *_: -len(state.put))
+    monkeypatch.setattr(search, "evidence", lambda state, *_: evidence[state.put])
+    return search
+
+
+def test_what_is_named_was_put_in_and_is_off_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A likelier rival takes the place of what was put in; what no line tells goes."""
+    lines = {"steer_lag": 1e-9, "steer_delay": 1e-9, "mass": 0.3}
+    begun, rival = ("steer_lag", "mass"), ("steer_delay", "mass")
+    evidence = {(): -9.0, begun: -2.0, rival: -2.0, ("steer_delay",): -1.0}
+    search = searching(monkeypatch, lines, evidence)
+    likelier = search.visited[frozenset(rival)]
     monkeypatch.setattr(
-        search, "_better", lambda state, _: likelier if state.put == sets[1] else state
+        search, "_better", lambda state, _: likelier if state.put == begun else state
     )
-    told, state = search._settled(Told(sets[1], lines), search.visited[frozenset(sets[1])])
+    told, state = search._settled(Told(begun, lines), search.visited[frozenset(begun)])
     assert state.put == told.put == ("steer_delay",)
     # Nothing at all is judged at its maximum; so is what is named.
     assert state.climbed
     assert search.visited[frozenset(state.put)] is state
+
+
+def test_what_is_not_worth_its_price_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a small variance ratio it was put in; that of all together is what counts in the end."""
+    lines = dict.fromkeys(("steer_delay", "mass", "yaw_inertia"), 1e-9)
+    every = ("steer_delay", "mass", "yaw_inertia")
+    evidence = {(): 0.0, ("steer_delay",): 9.0, every[:2]: 8.0, every: 4.0, ("steer_lag",): 12.0}
+    search = searching(monkeypatch, lines, evidence)
+    told, state = search.worth_their_price(Told(every, lines), search.visited[frozenset(every)])
+    # No part of what was put in is a rival.
+    assert state.put == told.put == ("steer_delay",)
+    assert state.climbed
 
 
 def test_what_is_named_is_likelier_than_all_that_was_fitted_without_it() -> None:
@@ -76,3 +99,27 @@ def test_what_is_named_is_likelier_than_all_that_was_fitted_without_it() -> None
     assert named(-9.0)
     assert not named(8.0)
     assert not named(-2.0)
+
+
+def test_a_group_is_off_nothing_where_one_of_it_is() -> None:
+    """A lag may explain as much as the delay that changed, and be known far less closely."""
+    states = {p: SimpleNamespace(put=p, climbed=True) for p in ((), ("lag",), ("delay",))}
+
+    def named(*closely_known: str) -> tuple[str, ...]:
+        search = Search.__new__(Search)
+        search.rules, search.tyres = USUAL, ()
+        search.visited = {frozenset(p): s for p, s in states.items()}  # type: ignore[misc]
+        search.evidence = lambda state, *_: 0.0  # type: ignore[method-assign]
+        search.over_nothing = lambda *_: 9.0  # type: ignore[method-assign]
+        search.odds = lambda *_: {"lag": 0.0, "delay": -0.4}  # type: ignore[method-assign]
+        search.told = lambda state: lines  # type: ignore[method-assign, assignment, return-value]
+        said = Saying.__new__(Saying)
+        said.search = search
+        said._off_nothing = lambda effect, *_: effect in closely_known  # type: ignore[method-assign]
+        lines = SimpleNamespace(causes=SimpleNamespace(of=lambda _: None))
+        found = said._exact("lag", states["lag",], lines, 1.0)  # type: ignore[arg-type]
+        return () if found is None else found.effects
+
+    assert named("lag", "delay") == ("lag", "delay")
+    assert named("delay") == ("lag", "delay")
+    assert not named()

@@ -11,7 +11,7 @@ import numpy as np
 from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect
 from ...errors import NumericalError
-from ...identify import Fit
+from ...identify import Fit, lost_to_input_noise
 from ...identify.search.box import free_box
 from ...identify.search.climb import climb as to_the_maximum
 from ...model import Model
@@ -49,7 +49,8 @@ class Exact:
     changes : dict of str to float
         By which parameters of what changed differ from the reference fitted in the same way.
     log_likelihood : float
-        Of both drivings.
+        Of both drivings, with exact inputs of the later one: of a lag and a delay by the same time
+        the lag is likelier otherwise, as it filters their noise.
     reached : float
         The same, less what the changes gain where they are in both the same: what the reference
         left is no evidence. By this it is likelier than nothing.
@@ -226,7 +227,8 @@ class Reference:
                 shift[self.place[n]] += moved * sum(sizes[own] for own in e.named)
         changes = {n: change(n, own.value(n), model.value(n)) for n in names}
         fit = replace(start, model=as_tyres(model))
-        told = (value, reached, among)
+        lost = lost_to_input_noise(fit, fit.driving)
+        told = (value + lost, reached + lost, among + lost)
         return Exact(tuple(put), fit, model, shift, sizes, changes, *told, climbed)
 
     def _climbed(

@@ -32,13 +32,18 @@ class Saying:
         self.told, self.state = search.found()
 
     def change(self) -> Change:
-        """Exact likelihoods decide on what was put in, scores on all else."""
+        """Exact likelihoods decide on what was put in, scores on all else.
+
+        Names are given of what is worth its price; sizes are told beside all that was put in,
+        which would be taken for a part of them otherwise.
+        """
         search, told, state = self.search, self.told, self.state
-        ratio = told.ratio_of(state.put)
-        exact = {e: self._exact(e, state, told, ratio) for e in state.put}
+        priced, few = search.worth_their_price(told, state)
+        ratio = priced.ratio_of(few.put)
+        exact = {e: self._exact(e, few, priced, ratio) for e in few.put}
         shown = [s for s in exact.values() if s is not None]
-        causes = told.causes.only([*shown, *self._not_refused()], {})
-        sizes, stds = self._told_sizes(shown)
+        causes = priced.causes.only([*shown, *self._not_refused(priced, few)], {})
+        sizes, stds = self._told_sizes(shown, few)
         nothing = self._nothing()
         calm = nothing > 1.0 - search.rules.credible
         found = [self._of(m, causes, sizes, stds, told, calm=calm) for m in self.search.may]
@@ -51,9 +56,9 @@ class Saying:
             search.before, state.fit, causes, tuple(found), nothing, search.alike, search.rules
         )
 
-    def _not_refused(self) -> list[CredibleSet]:
+    def _not_refused(self, told: Competition, state: Exact) -> list[CredibleSet]:
         """Sets by scores whose likeliest is not what was put in, and no refit has refused it."""
-        told, put = self.told, self.state.put
+        put = state.put
         return [
             s
             for s in told.causes.sets
@@ -63,7 +68,7 @@ class Saying:
         ]
 
     def _told_sizes(
-        self, shown: Sequence[CredibleSet]
+        self, shown: Sequence[CredibleSet], named: Exact
     ) -> tuple[dict[str, float], dict[str, float]]:
         """Sizes and standard errors by parameter: exact ones where there are, lines elsewhere."""
         told, state = self.told, self.state
@@ -75,7 +80,7 @@ class Saying:
             self._by_ratio(e, sizes, stds)
         for s in shown:
             for e in s.effects:
-                other = self._in_place(e, s, state)
+                other = self._in_place(e, s, state) or self._in_place(e, s, named)
                 if other is not None and e not in state.put:
                     beside = self.search.told(other)
                     sizes |= self._sizes_in(other, e)
@@ -170,8 +175,6 @@ class Saying:
         self, effect: str, state: Exact, told: Competition, ratio: float
     ) -> CredibleSet | None:
         """What may have changed in place of an effect that was put in; None where nothing need."""
-        if not self._off_nothing(effect, state, told):
-            return None
         here = self.search.evidence(state, told, ratio)
         log_odds = self.search.odds(effect, state, told)
         linear = told.causes.of(effect)
@@ -180,7 +183,9 @@ class Saying:
             for e, weight in linear.weights.items():
                 if e not in log_odds and min(weight, own) > 0.0:
                     log_odds[e] = float(np.log(weight / own))
-        found = self._told_apart(effect, log_odds, state)
+        found = self._told_apart(effect, log_odds, state, ratio)
+        if not self._some_off_nothing(effect, found, state, told):
+            return None
         absent = [
             self.search.evidence(s, told, ratio) - here
             if s.put
@@ -193,11 +198,29 @@ class Saying:
             return None
         return found
 
-    def _told_apart(self, effect: str, log_odds: dict[str, float], state: Exact) -> CredibleSet:
+    def _some_off_nothing(
+        self, effect: str, of: CredibleSet, state: Exact, told: Competition
+    ) -> bool:
+        """Whether an effect that was put in, or one of its set in its place, is off nothing.
+
+        Whichever of them changed, it is not nothing: the likeliest need not be the closest known.
+        """
+        if self._off_nothing(effect, state, told):
+            return True
+        others = ((e, self._in_place(e, of, state)) for e in of.effects if e != effect)
+        return any(
+            self._off_nothing(e, other, self.search.told(other))
+            for e, other in others
+            if other is not None
+        )
+
+    def _told_apart(
+        self, effect: str, log_odds: dict[str, float], state: Exact, ratio: float
+    ) -> CredibleSet:
         """The credible set of an effect and its rivals, but for those that are nothing beside it.
 
         What the reference lacks gains likelihood as a change of it does: beside each other lines
-        tell which of the two differs.
+        tell which of the two differs, where the likelihood does not do as well without it.
         """
         while True:
             found = CredibleSet.of(log_odds, self.search.rules.credible)
@@ -205,6 +228,11 @@ class Saying:
                 both = self.search.visited.get(frozenset({*state.put, e}))
                 if e == effect or both is None:
                     continue
+                alone = self.search.visited.get(frozenset({*state.put, e}) - {effect})
+                if alone is not None:
+                    gain = (both.log_likelihood - alone.log_likelihood) / ratio
+                    if gain < self.search.rules.told:
+                        continue
                 beside = self.search.told(both)
                 if not self._off_nothing(e, both, beside) and self._off_nothing(
                     effect, both, beside

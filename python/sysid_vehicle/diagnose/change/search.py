@@ -146,6 +146,20 @@ class Search:
         best = self._at_maximum(state)
         return (told, state) if best is state else (self.told(best), best)
 
+    def worth_their_price(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
+        """Of a state what is worth its price at the variance ratio that all together end with.
+
+        That of fewer changes may be smaller, and by it more was put in.
+        """
+        while True:
+            put, ratio = frozenset(state.put), told.ratio_of(state.put)
+            parts = (s for key, s in self.visited.items() if key < put)
+            part = max((state, *parts), key=lambda s: self.evidence(s, told, ratio))
+            if part is state:
+                return told, state
+            state = self._at_maximum(part)
+            told = self.told(state)
+
     def _at_maximum(self, state: Exact) -> Exact:
         """The state where its likelihood is highest, as that of nothing is."""
         if not state.climbed:
