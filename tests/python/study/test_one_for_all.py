@@ -52,7 +52,9 @@ def test_nothing_is_said_where_all_was_sought_or_one_effect_found(heavy: Fit) ->
 def test_effects_with_causes_of_their_own_are_no_one_error(start: Model, truth: Model) -> None:
     found = ("aero_drag", "steer_offset")
     hidden = {"aero_drag.drag_area_m2": 0.3, "steer_offset.offset_rad": 0.002}
-    log = drive(truth.add(*found).with_values(hidden), manoeuvres.lap(40.0), seed=531006)
+    log = drive(
+        truth.add(*found).with_values(hidden), manoeuvres.lap(40.0), seed=531006, rate_hz=50.0
+    )
     fit = identify(start, log, starts=1)
     final = refine(fit.model.add(*found), fit.driving, fit.noise)
     assert one_for_all(fit, final, found, all_but(fit, "mass", "force_gain"), USUAL) == ""
