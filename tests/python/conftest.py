@@ -23,6 +23,7 @@ settings.register_profile("long", deadline=None, max_examples=20_000, print_blob
 settings.load_profile("repeatable")
 
 REPO = Path(__file__).resolve().parents[2]
+RATE_HZ = 50.0  # of the drives that many tests share: what is done with them takes half as long
 
 # Those that take longest come first. Without these files, `-m "not slow"`, the tests take less than
 # a minute on two cores.
@@ -104,13 +105,32 @@ def start(car: Vehicle) -> Model:
 @pytest.fixture(scope="session")
 def lap(truth: Model) -> Log:
     """Driving to fit to."""
-    return drive(truth, drives.lap(40.0), seed=1)
+    return drive(truth, drives.lap(40.0), seed=1, rate_hz=RATE_HZ)
 
 
 @pytest.fixture(scope="session")
 def course(truth: Model) -> Log:
     """Other driving of the same car."""
+    course = drives.handling_course(30.0, lateral_mps2=7.5)
+    return drive(truth, course, seed=2, rate_hz=RATE_HZ)
+
+
+@pytest.fixture(scope="session")
+def fine_lap(truth: Model) -> Log:
+    """The lap at 100 Hz, for what so many samples show."""
+    return drive(truth, drives.lap(40.0), seed=1)
+
+
+@pytest.fixture(scope="session")
+def fine_course(truth: Model) -> Log:
+    """The other driving at 100 Hz."""
     return drive(truth, drives.handling_course(30.0, lateral_mps2=7.5), seed=2)
+
+
+@pytest.fixture(scope="session")
+def fine_fit(start: Model, fine_lap: Log) -> Fit:
+    """The complete model fitted to the lap at 100 Hz."""
+    return identify(start, fine_lap, starts=3)
 
 
 @pytest.fixture(scope="session")
@@ -122,18 +142,19 @@ def fit(start: Model, lap: Log) -> Fit:
 @pytest.fixture(scope="session")
 def complete_fits(truth: Model, start: Model) -> tuple[Fit, ...]:
     """Fits of the complete model to drives that differ in their noise alone."""
-    logs = [drive(truth, drives.lap(30.0), seed=seed) for seed in (11, 12, 13, 14)]
+    logs = [drive(truth, drives.lap(30.0), seed=s, rate_hz=RATE_HZ) for s in (11, 12, 13, 14)]
     return tuple(identify(start, log, starts=1) for log in logs)
 
 
 @pytest.fixture(scope="session")
-def hidden_fit(truth: Model, start: Model) -> Callable[[str, float], Fit]:
+def hidden_fit(truth: Model, start: Model) -> Callable[..., Fit]:
     """Give the baseline fitted to a drive of a car with a parameter of an effect, by full name."""
 
     @cache
-    def fitted(name: str, value: float) -> Fit:
+    def fitted(name: str, value: float, rate_hz: float = RATE_HZ) -> Fit:
         car = truth.add(name.split(".")[0]).with_values({name: value})
-        return identify(start, drive(car, drives.lap(40.0), seed=5), starts=1)
+        log = drive(car, drives.lap(40.0), seed=5, rate_hz=rate_hz)
+        return identify(start, log, starts=1)
 
     return fitted
 

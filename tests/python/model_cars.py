@@ -35,7 +35,7 @@ def drives(truth: sv.Model, seed: int) -> list[sv.Log]:
         vy_mps=usual.vy_mps * SPEED,
         yaw_rate_radps=usual.yaw_rate_radps / TIME,
     )
-    rate_hz = round(100.0 / TIME)
+    rate_hz = round(50.0 / TIME)
     return [
         sv.drive(truth, manoeuvre, seed=seed + i, noise=noise, rate_hz=rate_hz)
         for i, manoeuvre in enumerate(

@@ -1,9 +1,13 @@
 """The benchmark of next drives asks, drives and counts as it says."""
 
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from few_drives import asked_of_few
+
+import sysid_vehicle as sv
 
 BENCHMARK = ("next_drive", "followed", "answers", "design", "truths")
 
@@ -68,7 +72,18 @@ def test_distances_are_those_of_what_is_there(program: SimpleNamespace) -> None:
 
 
 @pytest.mark.slow
-def test_a_question_is_followed(program: SimpleNamespace) -> None:
+def test_a_question_is_followed(program: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    near = (
+        "steer_delay",
+        "steer_lag",
+        "tyre_relaxation",
+        "sensor_delay",
+        "yaw_inertia",
+        "aero_drag",
+    )
+    monkeypatch.setattr(sv, "improve", partial(sv.improve, candidates=near))
+    monkeypatch.setattr(program.followed, "_STARTS", 1)
+    asked_of_few(monkeypatch, 2)
     trial = program.design.Trial("effect", ("steer_delay",), 0.5, "ramp", "nominal", True, "saloon")
     done = program.followed.followed(trial)
     assert done["state"] == "done"

@@ -24,8 +24,8 @@ from sysid_vehicle.estimate import MEASURED
 
 
 @pytest.fixture(scope="module")
-def validation(fit: Fit, course: Log) -> Comparison:
-    return compare(fit, course)
+def validation(fine_fit: Fit, fine_course: Log) -> Comparison:
+    return compare(fine_fit, fine_course)
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,8 @@ def test_a_channel_whose_noise_the_fit_did_not_learn_has_no_score(
     assert set(compare(blind, course.without("ax_mps2")).channels) == set(found.channels)
 
 
-def test_samples_keep_their_place(validation: Comparison, fit: Fit, course: Log) -> None:
+def test_samples_keep_their_place(validation: Comparison, fine_fit: Fit, fine_course: Log) -> None:
+    fit, course = fine_fit, fine_course
     assert np.array_equal(validation.time_s, course["time_s"])
     assert validation.residual.shape == (course.n, 5)
     both = compare(fit, [course, course])

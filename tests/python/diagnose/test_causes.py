@@ -98,7 +98,7 @@ def test_what_a_large_effect_does_beyond_first_order_is_no_further_cause(
     Beside the mass their scores are next to nothing: none of them is refitted.
     """
     heavy = truth.add("mass").with_values({"mass.relative_error": 0.2})
-    log = drive(heavy, manoeuvres.lap(30.0), seed=1)
+    log = drive(heavy, manoeuvres.lap(30.0), seed=1, rate_hz=50.0)
     some = ["mass", "force_gain", "yaw_inertia", "aero_drag", "steer_lag"]
     found = diagnose(identify(start, log, starts=1), candidates=some)
     assert len(found.proposed.sets) > 1
@@ -130,7 +130,7 @@ def test_what_is_scored_over_a_grid_is_refitted_too(
 def test_two_that_are_missing_both_stand(start: Model, truth: Model) -> None:
     both = {"mass.relative_error": 0.15, "steer_offset.offset_rad": 0.006}
     car = truth.add("mass", "steer_offset").with_values(both)
-    log = drive(car, manoeuvres.lap(30.0), seed=2)
+    log = drive(car, manoeuvres.lap(30.0), seed=2, rate_hz=50.0)
     some = ["mass", "steer_offset", "yaw_inertia", "force_gain"]
     causes = diagnose(identify(start, log, starts=1), candidates=some).causes
     assert {s.effects[0] for s in causes.sets} == {"mass", "steer_offset"}
@@ -170,7 +170,7 @@ def test_a_centre_of_gravity_that_is_off_is_one_fact(start: Model, car: Vehicle)
     off = {"imu_lever_arm.forward_m": 0.12, "speed_sensor_lever_arm.forward_m": 0.12}
     behind = Model(car.replace(lf_m=car.lf_m + 0.12, lr_m=car.lr_m - 0.12))
     mounted = behind.add(*(n.split(".")[0] for n in off)).with_values(off)
-    log = drive(mounted, manoeuvres.lap(30.0), seed=71)
+    log = drive(mounted, manoeuvres.lap(30.0), seed=71, rate_hz=50.0)
     fit = identify(start, log, starts=1)
     causes = diagnose(fit, refits=0).causes
     assert [s.effects[0] for s in causes.sets] == ["cg_position"]
@@ -192,7 +192,7 @@ def test_causes_of_a_log_without_wheel_force(
 
 
 def test_the_clock_of_the_steering_has_a_sign(start: Model, truth: Model) -> None:
-    log = drive(truth, manoeuvres.step_steer((20.0,), (3.0, 5.0)), seed=5)
+    log = drive(truth, manoeuvres.step_steer((20.0,), (3.0, 5.0)), seed=5, rate_hz=50.0)
     t = log["time_s"]
     # The log tells 30 ms too late what the wheels do: the car answers before.
     late = np.interp(t - 0.03, t, log["steer_rad"])

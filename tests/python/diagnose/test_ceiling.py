@@ -33,7 +33,9 @@ def test_nothing_is_explainable_beside_the_right_model(fit: Fit, course: Log) ->
 
 def test_disturbances_of_the_road_are_not_explainable(truth: Model, fit: Fit) -> None:
     rough = RoadDisturbance(fy_n=400.0, mz_nm=200.0)
-    logs = [drive(truth, manoeuvres.lap(40.0), seed=s, disturbance=rough) for s in (5, 6)]
+    logs = [
+        drive(truth, manoeuvres.lap(40.0), seed=s, disturbance=rough, rate_hz=50.0) for s in (5, 6)
+    ]
     found = ceiling(fit, logs[1], logs[0])
     assert all(f.rms > 100.0 for f in found.forces)
     assert all(f.share < 0.15 for f in found.forces)
@@ -60,7 +62,9 @@ def test_what_depends_on_the_driving_is_shown_on_both_data_sets(fit: Fit, course
 
 def test_what_disturbs_at_random_has_no_structure(truth: Model, fit: Fit) -> None:
     rough = RoadDisturbance(fy_n=400.0, mz_nm=200.0)
-    logs = [drive(truth, manoeuvres.lap(40.0), seed=s, disturbance=rough) for s in (5, 6)]
+    logs = [
+        drive(truth, manoeuvres.lap(40.0), seed=s, disturbance=rough, rate_hz=50.0) for s in (5, 6)
+    ]
     train, test = map(Driving.of, logs)
     found = structure(replace(fit, driving=train), test)
     assert found.everywhere < 0.05

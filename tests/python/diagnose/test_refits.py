@@ -47,7 +47,7 @@ def test_lags_of_one_parameter_may_hide_in_the_noise() -> None:
 
 def test_a_lag_is_found_from_its_typical_size(truth: Model, start: Model) -> None:
     car = truth.add("tyre_relaxation").with_values({"tyre_relaxation.relaxation_length_m": 0.7})
-    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3, rate_hz=50.0), starts=1)
     found = from_typical(fit, scored(fit, "tyre_relaxation"), 30)
     assert found.finished
     assert found.p_value < 1e-6
@@ -77,7 +77,9 @@ def test_a_lag_that_a_road_hides_is_tried_where_its_score_alone_would_tell(
 @pytest.mark.parametrize("hidden", RELAXATIONS)
 def test_the_axles_that_relax_are_told_apart(truth: Model, start: Model, hidden: str) -> None:
     car = truth.add(hidden).with_values({f"{hidden}.relaxation_length_m": 0.6})
-    found = diagnose(identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1))
+    found = diagnose(
+        identify(start, drive(car, manoeuvres.lap(15.0), seed=3, rate_hz=50.0), starts=1)
+    )
     first = found.ranking[0]
     assert first.id == hidden
     assert not {*RELAXATIONS} & {*first.indistinguishable_from}
@@ -90,8 +92,9 @@ def test_a_lag_that_is_not_there_is_not_found(complete_fits: tuple[Fit, ...]) ->
     assert np.isfinite(p).all()
 
 
-def test_a_refit_is_never_worse_than_the_model_that_it_contains(fit: Fit) -> None:
+def test_a_refit_is_never_worse_than_the_model_that_it_contains(fine_fit: Fit) -> None:
     """Precise sensors tell a tenth of a typical delay from none by hundreds of nats."""
+    fit = fine_fit
     one = replace(scored(fit, "sensor_delay"), value=(0.06, 0.02))
     found = refitted(fit, fit.driving, one)
     assert found.statistic == 0.0
@@ -107,7 +110,7 @@ def test_a_refit_ends_with_a_round_that_gains_next_to_nothing(
 ) -> None:
     """The maximum with frozen gains and that of the likelihood are not quite the same place."""
     car = truth.add("mass").with_values({"mass.relative_error": 0.1})
-    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3, rate_hz=50.0), starts=1)
     module, reached = sys.modules["sysid_vehicle.identify.maximum"], []
 
     def seen(objective: Objective, *rest: Any, **options: Any) -> tuple[np.ndarray, Any]:
@@ -128,7 +131,7 @@ def test_the_best_of_either_motion_is_refitted(truth: Model, start: Model) -> No
     """Lateral effects lead by far, and say nothing of what moves the car along."""
     hidden = {"steer_lag.time_constant_s": 0.1, "aero_drag.drag_area_m2": 0.12}
     car = truth.add("steer_lag", "aero_drag").with_values(hidden)
-    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3, rate_hz=50.0), starts=1)
     found = diagnose(fit, refits=1).ranking
     along = [c for c in found if c.effect.along_alone]
     lateral = [c for c in found if not c.effect.along_alone]
@@ -171,7 +174,7 @@ def test_what_acts_like_the_best_along_the_car_is_refitted_whatever_it_scores(fi
 def test_of_two_delays_one_may_not_be_there(truth: Model, start: Model) -> None:
     car = truth.add("sensor_delay").with_values({"sensor_delay.speeds_s": 0.0})
     car = car.with_values({"sensor_delay.inertial_s": 0.03})
-    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3, rate_hz=50.0), starts=1)
     found = refitted(fit, fit.driving, scored(fit, "sensor_delay"))
     assert found.statistic > 100.0
     speeds, inertial = found.value

@@ -198,7 +198,7 @@ def test_an_arm_of_a_sensor_that_the_model_has_is_no_contradiction(
     def model(forward_m: float) -> Model:
         return truth.add(effect).with_values({f"{effect}.forward_m": forward_m})
 
-    driving = Driving.of(drive(model(-1.6), manoeuvres.ramp_steer(), seed=3))
+    driving = Driving.of(drive(model(-1.6), manoeuvres.ramp_steer(), seed=3, rate_hz=50.0))
     # v_y - 1.6 m r reads, at 20 m/s, like a yaw rate that is 80 ms late.
     assert set(incoherent(driving, truth.add("mass"))) == {"yaw_rate_radps"}
     assert incoherent(driving, model(-1.6)) == {}

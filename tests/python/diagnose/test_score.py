@@ -132,7 +132,7 @@ def test_a_one_sided_effect_of_the_wrong_sign_is_no_evidence(
     one_sided = {e.id for e in catalogue() if len(e.parameters) == 1 and e.parameters[0].one_sided}
     assert {"steer_lag", "tyre_relaxation"} <= one_sided
     # An early steering signal would need a negative lag.
-    log = drive(truth, manoeuvres.lap(30.0), seed=7)
+    log = drive(truth, manoeuvres.lap(30.0), seed=7, rate_hz=50.0)
     data = {c: log[c] for c in log.channels}
     late = {c: np.roll(v, 3) if c == "steer_rad" else v for c, v in data.items()}
     cut = Log.from_arrays({c: v[10:] for c, v in late.items()}, check=False)
@@ -189,7 +189,7 @@ def test_a_score_of_few_effects_is_theirs_in_the_score_of_all(fit: Fit) -> None:
     assert score_board(fit, fit.driving, ()).family_p_values() == {}
 
 
-def test_a_delay_that_a_fast_filter_cannot_follow_is_tried_shorter(fit: Fit) -> None:
+def test_a_delay_that_a_fast_filter_cannot_follow_is_tried_shorter(fit: Fit, truth: Model) -> None:
     """Gains that trust the sensors wholly oscillate with readings that come late, ever more."""
     sure = replace(
         fit.noise,
@@ -198,7 +198,8 @@ def test_a_delay_that_a_fast_filter_cannot_follow_is_tried_shorter(fit: Fit) -> 
         disturbance=(5e3, 5e3, 5e3),
     )
     late = [effect("sensor_delay")]
-    evidence = Evidence(replace(fit, noise=sure), fit.driving)
+    fine = Driving.of(drive(truth, manoeuvres.lap(20.0), seed=1))
+    evidence = Evidence(replace(fit, noise=sure), fine)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found = sensitivities(evidence, late).columns

@@ -36,9 +36,9 @@ def test_a_complete_model_is_hardly_less_sure(complete_fits: tuple[Fit, ...]) ->
     ],
 )
 def test_what_is_missing_widens_intervals_until_they_hold_the_truth(
-    hidden_fit: Callable[[str, float], Fit], truth: Model, missing: str, value: float
+    hidden_fit: Callable[..., Fit], truth: Model, missing: str, value: float
 ) -> None:
-    fit = hidden_fit(missing, value)
+    fit = hidden_fit(missing, value, 100.0)
     assert max(off(fit, truth, None)) > 2.5
     assert max(off(fit, truth, widened(fit, fit.driving))) < 2.0
 

@@ -50,10 +50,10 @@ def test_where_all_is_slow_less_speed_is_enough(short: Log, altered: Callable[..
 
 def test_slow_parts_are_left_out(short: Log, truth: Model, altered: Callable[..., Log]) -> None:
     vx = short["vx_mps"].copy()
-    vx[400:600] = 1.0
+    vx[200:300] = 1.0
     driving = Driving.of(altered(short, vx_mps=vx))
-    assert [(s.where.start, s.where.stop) for s in driving.stretches] == [(0, 400), (600, short.n)]
-    assert driving.problem(truth).samples == driving.samples == short.n - 200
+    assert [(s.where.start, s.where.stop) for s in driving.stretches] == [(0, 200), (300, short.n)]
+    assert driving.problem(truth).samples == driving.samples == short.n - 100
 
 
 def test_without_force_the_acceleration_becomes_an_input(
@@ -94,14 +94,14 @@ def test_where_the_acceleration_takes_the_place_of_a_force_it_counts_as_an_input
     """Its short holes are filled, and where it is missing for long the model does not run."""
     ax = course["ax_mps2"].copy()
     ax[100:103] = np.nan
-    ax[2000:2100] = np.nan
-    with pytest.warns(SysidWarning, match="ax_mps2: no values at samples 2000 to 2099"):
+    ax[1000:1050] = np.nan
+    with pytest.warns(SysidWarning, match="ax_mps2: no values at samples 1000 to 1049"):
         holed = altered(course, ax_mps2=ax)
     with pytest.warns(SysidWarning, match="has no fx_n"):
         driving = Driving.of([altered(short, without=["fx_n"]), holed])
     assert [(s.where.start, s.where.stop) for s in driving.stretches[1:]] == [
-        (0, 2000),
-        (2100, course.n),
+        (0, 1000),
+        (1050, course.n),
     ]
     assert np.isfinite(driving.inputs()).all()
 

@@ -200,7 +200,9 @@ def test_the_size_of_an_effect_is_found(
     name: str, value: float, truth: Model, start: Model
 ) -> None:
     effect = name.split(".")[0]
-    log = drive(truth.add(effect).with_values({name: value}), manoeuvres.lap(30.0), seed=6)
+    log = drive(
+        truth.add(effect).with_values({name: value}), manoeuvres.lap(30.0), seed=6, rate_hz=50.0
+    )
     found = identify(start.add(effect), log, starts=1)[name]
     assert found.note == ""
     assert abs(found.value - value) < SPREAD * found.std
@@ -240,26 +242,26 @@ def test_holes_are_no_obstacle(
     start: Model, car: Vehicle, lap: Log, altered: Callable[..., Log]
 ) -> None:
     ay, vy, steer = (lap[c].copy() for c in ("ay_mps2", "vy_mps", "steer_rad"))
-    ay[500:900] = np.nan
-    vy[800:2000] = np.nan
-    steer[2500:2600] = np.nan
+    ay[250:450] = np.nan
+    vy[400:1000] = np.nan
+    steer[1250:1300] = np.nan
     with pytest.warns(SysidWarning) as told:
         holed = altered(lap, ay_mps2=ay, vy_mps=vy, steer_rad=steer)
     said = "\n".join(str(w.message) for w in told)
     for channel, samples in (
-        ("ay_mps2", "500 to 899"),
-        ("vy_mps", "800 to 1999"),
-        ("steer_rad", "2500 to 2599"),
+        ("ay_mps2", "250 to 449"),
+        ("vy_mps", "400 to 999"),
+        ("steer_rad", "1250 to 1299"),
     ):
         assert f"{channel}: no values at samples {samples}" in said
     found = identify(start, holed, starts=1)
-    assert found.driving.samples == lap.n - 100
+    assert found.driving.samples == lap.n - 50
     assert "in 2 stretch(es)" in str(found)
     assert_stiffness_found(found, car)
 
 
 def test_what_gentle_driving_cannot_tell_is_named(start: Model, truth: Model) -> None:
-    gentle = drive(truth, manoeuvres.lap(30.0, lateral_mps2=2.5), seed=8)
+    gentle = drive(truth, manoeuvres.lap(30.0, lateral_mps2=2.5), seed=8, rate_hz=50.0)
     found = identify(start, gentle, starts=2)
     # Far below the peak only the stiffness B C D shows.
     assert {"D_front", "D_rear", "E_front", "E_rear"} <= set(found.undetermined)
@@ -269,7 +271,7 @@ def test_what_gentle_driving_cannot_tell_is_named(start: Model, truth: Model) ->
 
 
 def test_straight_driving_warns(start: Model, truth: Model) -> None:
-    straight = drive(truth, manoeuvres.straight_acceleration(20.0), seed=8)
+    straight = drive(truth, manoeuvres.straight_acceleration(20.0), seed=8, rate_hz=50.0)
     with pytest.warns(SysidWarning, match="straight_acceleration"):
         found = identify(start, straight, starts=1)
     assert "D_front" in found.undetermined
@@ -301,7 +303,8 @@ def test_going_on_from_a_fit_changes_nothing(fit: Fit) -> None:
     assert fixed.log_likelihood >= fit.log_likelihood - 1e-6
 
 
-def test_a_fit_tells_its_figures(fit: Fit) -> None:
+def test_a_fit_tells_its_figures(fine_fit: Fit) -> None:
+    fit = fine_fit
     e = fit["B_front"]
     assert (e.name, e.unit) == ("B_front", "1/rad")
     assert e.interval == pytest.approx((e.value - 1.96 * e.std, e.value + 1.96 * e.std))
@@ -317,7 +320,9 @@ def test_a_fit_tells_its_figures(fit: Fit) -> None:
 
 
 def test_more_noise_gives_wider_intervals(fit: Fit, start: Model, truth: Model) -> None:
-    noisy = drive(truth, manoeuvres.lap(40.0), seed=1, noise=SensorNoise().scaled(3.0))
+    noisy = drive(
+        truth, manoeuvres.lap(40.0), seed=1, noise=SensorNoise().scaled(3.0), rate_hz=50.0
+    )
     found = identify(start, noisy, starts=1)
     ratio = found.derived[0].std / fit.derived[0].std
     assert 2.0 < ratio < 5.0

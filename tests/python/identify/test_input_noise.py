@@ -17,9 +17,9 @@ def late(effect: str) -> sv.Model:
     return start().add(effect).with_values({f"{effect}.{TWO[effect]}": LATE_S})
 
 
-def log(effect: str, steer_rad: float) -> sv.Log:
+def log(effect: str, steer_rad: float, rate_hz: float = 100.0) -> sv.Log:
     noise = sv.SensorNoise(steer_rad=steer_rad)
-    return sv.drive(late(effect), sv.manoeuvres.lap(), seed=71, noise=noise)
+    return sv.drive(late(effect), sv.manoeuvres.lap(), seed=71, noise=noise, rate_hz=rate_hz)
 
 
 def fitted(log: sv.Log, *effects: str) -> dict[str, Fit]:
@@ -40,14 +40,16 @@ def test_a_lag_is_likelier_than_the_delay_that_is_there_and_not_with_exact_input
 
 def test_exact_inputs_take_nothing() -> None:
     # Drive and brake follow the curves of the manoeuvre, with no noise of their own.
-    fit = fitted(log("steer_lag", 0.0), "steer_lag")["steer_lag"]
+    fit = fitted(log("steer_lag", 0.0, 50.0), "steer_lag")["steer_lag"]
     assert lost_to_input_noise(fit, fit.driving) < 0.5
     assert with_exact_inputs(fit) == pytest.approx(fit.log_likelihood, abs=0.5)
 
 
 def test_the_study_says_that_a_smooth_lap_tells_a_delay_from_no_lag() -> None:
-    course = sv.drive(late("steer_delay"), sv.manoeuvres.handling_course(), seed=72)
-    study = sv.improve(start(), log("steer_delay", 2e-4), course, starts=3)
+    course = sv.drive(
+        late("steer_delay"), sv.manoeuvres.handling_course(30.0), seed=72, rate_hz=50.0
+    )
+    study = sv.improve(start(), log("steer_delay", 2e-4, 50.0), course, starts=3)
     (added,) = study.added
     assert {added.id, *added.confounded_with} >= {"steer_delay"}
     assert added.id == "steer_delay" or added.grade == "plausible"

@@ -15,7 +15,7 @@ def test_a_peak_that_the_driving_did_not_reach_is_extrapolated(
     fit: Fit, truth: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By noise alone a curve seems to be known as far as its formula goes."""
-    gentle = drive(truth, manoeuvres.lap(30.0, 3.0), seed=11)
+    gentle = drive(truth, manoeuvres.lap(30.0, 3.0), seed=11, rate_hz=50.0)
     below = refine(fit.model, Driving.of(gentle), fit.noise)
     sure = replace(below, covariance=1e-6 * below.covariance)
     for axle in ("front", "rear"):

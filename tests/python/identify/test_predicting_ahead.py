@@ -52,10 +52,10 @@ def test_of_the_right_model_both_criteria_tell_the_same_car(
 
 
 def test_tyres_that_the_likelihood_bends_do_not_hold_the_search_back(
-    hidden_fit: Callable[[str, float], Fit],
+    hidden_fit: Callable[..., Fit],
 ) -> None:
     """From such a shape alone it ends where the car errs 1 % more."""
-    fit = hidden_fit("tyre_relaxation.relaxation_length_m", 0.6)
+    fit = hidden_fit("tyre_relaxation.relaxation_length_m", 0.6, 100.0)
     front = {"B_front": 7.0, "C_front": 0.5, "D_front": 2.2, "E_front": 0.4}
     rear = {"B_rear": 25.0, "C_rear": 0.5, "D_rear": 2.4, "E_rear": -6.0}
     bent = replace(fit, model=fit.model.with_values(front | rear))
@@ -104,7 +104,10 @@ def test_a_window_counts_alike_at_any_rate(truth: Model, start: Model) -> None:
     assert abs(found[1] - found[0]) < 0.15 * abs(alone[1] - alone[0])
 
 
-def test_what_is_fixed_or_known_beforehand_stays(start: Model, lap: Log, fit: Fit) -> None:
+def test_what_is_fixed_or_known_beforehand_stays(
+    start: Model, fine_lap: Log, fine_fit: Fit
+) -> None:
+    lap, fit = fine_lap, fine_fit
     held = identify(
         fit.model, lap, starts=1, horizon_s=1.0, fixed=["E_front"], priors={"D_rear": (1.3, 1e-4)}
     )

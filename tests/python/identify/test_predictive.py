@@ -14,7 +14,7 @@ from sysid_vehicle.identify.predictive import _remembered
 @pytest.fixture(scope="module")
 def gentle(start: Model, truth: Model) -> Fit:
     """Tells the cornering stiffness, and nothing of the peak."""
-    return identify(start, drive(truth, manoeuvres.sine_sweep(), seed=1), starts=2)
+    return identify(start, drive(truth, manoeuvres.sine_sweep(), seed=1, rate_hz=50.0), starts=2)
 
 
 def plain(fit: Fit, driving: Driving) -> float:
@@ -70,7 +70,7 @@ def test_what_both_drivings_saw_lies_between(
     fit: Fit, truth: Model, lap: Log, start: Model
 ) -> None:
     stiff = truth.with_values({"B_front": 1.02 * truth.value("B_front")})
-    other = Driving.of(drive(stiff, manoeuvres.lap(40.0), seed=1))
+    other = Driving.of(drive(stiff, manoeuvres.lap(40.0), seed=1, rate_hz=50.0))
     both = replace(fit, model=predict(fit, other, fit.noise).model)
     anew = identify(start, other, starts=1)
     one, between, two = (f.derived[0] for f in (fit, both, anew))

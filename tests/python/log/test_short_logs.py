@@ -5,8 +5,13 @@ import warnings
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput, Log, SysidWarning
+from sysid_vehicle import InvalidInput, Log, Model, SysidWarning, drive, manoeuvres
 from sysid_vehicle.log import check_excitation
+
+
+@pytest.fixture(scope="module")
+def lap(truth: Model) -> Log:
+    return drive(truth, manoeuvres.lap(40.0), seed=1)
 
 
 def columns(log: Log, n: int, first: int = 0) -> dict[str, np.ndarray]:

@@ -30,7 +30,8 @@ def vehicle():
 
 @pytest.fixture(scope="module")
 def log(vehicle):
-    return sv.drive(sv.Model(vehicle), sv.manoeuvres.handling_course(), seed=1).between(0.0, 30.0)
+    course = sv.manoeuvres.handling_course(12.0)
+    return sv.drive(sv.Model(vehicle), course, seed=1)
 
 
 @pytest.fixture(scope="module")

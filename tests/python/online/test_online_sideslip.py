@@ -91,6 +91,7 @@ def test_wrong_stiffness_is_corrected_within_20_s_of_cornering(vehicle, log, fac
 @pytest.mark.parametrize("column", range(5))
 @pytest.mark.parametrize("fault", ["drops out", "freezes", "jumps"])
 def test_a_sensor_that_fails_for_two_seconds_does_no_lasting_harm(vehicle, log, column, fault):
+    log = log.between(0.0, 25.0)  # it fails in the second second
     sensors = sensors_of(log)
     rate = round(log.rate_hz)
     first = int(np.argmax(np.abs(log["ay_mps2"]) > 3.0))

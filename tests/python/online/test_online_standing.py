@@ -16,7 +16,7 @@ Columns = dict[str, np.ndarray]
 
 @pytest.fixture(scope="module")
 def driven() -> Columns:
-    log = sv.drive(sv.Model(CAR), sv.manoeuvres.handling_course(), seed=140114)
+    log = sv.drive(sv.Model(CAR), sv.manoeuvres.handling_course(15.0), seed=140114)
     return {name: np.array(log[name]) for name in log.channels}
 
 

@@ -276,6 +276,7 @@ def test_on_a_road_that_wanders_kinematics_tells_no_delays(
     late = _with(log, vx_mps=np.interp(log["time_s"] - 0.03, log["time_s"], log["vx_mps"]))
     checked = sv.check(late)
     assert checked["delay_vx_s"].found
+    monkeypatch.setattr(_ready, "checked", lambda *_, **__: checked)
     assert made_ready([late], [])[2].settles
     wandering = replace(checked.estimate, road_mps2={"grade": 0.15, "bank": 0.0})
     monkeypatch.setattr(_ready, "checked", lambda *_, **__: replace(checked, estimate=wandering))

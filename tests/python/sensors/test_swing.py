@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+
 import numpy as np
 import pytest
 import scipy
@@ -33,12 +36,18 @@ def lap() -> sv.Log:
     return sv.drive(model, sv.manoeuvres.lap(60.0), noise=quiet, seed=11)
 
 
+@pytest.fixture(scope="module")
+def checked(lap: sv.Log) -> Callable[..., sv.SensorCheck]:
+    """The check of such readings."""
+    return cache(lambda *of: sv.check(rolling(lap, *of)))
+
+
 @pytest.mark.parametrize(("natural_hz", "damping"), [(1.5, 0.25), (1.8, 0.35)])
 @pytest.mark.parametrize("above_m", [0.5, -0.3, -0.5])
 def test_an_imu_at_another_height_is_no_other_fault(
-    lap: sv.Log, above_m: float, natural_hz: float, damping: float
+    checked: Callable[..., sv.SensorCheck], above_m: float, natural_hz: float, damping: float
 ) -> None:
-    check = sv.check(rolling(lap, above_m, natural_hz, damping))
+    check = checked(above_m, natural_hz, damping)
     assert [fault.name for fault in check.found] == ["gain_ay"]
     roll = check["gain_ay"]
     assert abs(roll.value - ROLL) < 3.0 * roll.std
@@ -49,8 +58,10 @@ def test_an_imu_at_another_height_is_no_other_fault(
         assert "speeds that were smoothed" in str(check)
 
 
-def test_what_a_swinging_body_explains_as_well_is_no_fault(lap: sv.Log) -> None:
-    delay = sv.check(rolling(lap, -0.5, 1.8, 0.35))["delay_vy_s"]
+def test_what_a_swinging_body_explains_as_well_is_no_fault(
+    checked: Callable[..., sv.SensorCheck],
+) -> None:
+    delay = checked(-0.5, 1.8, 0.35)["delay_vy_s"]
     assert not delay.found
     assert "an IMU above the speed sensor, on a body that rolls" in delay.why_not
 

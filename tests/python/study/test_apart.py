@@ -25,7 +25,9 @@ ALONG = moving_with({"vx_mps"})
 def lanes(truth: Model) -> Driving:
     """Speeds up between lane changes at constant speed, by a third of all the time."""
     heavy = truth.add("mass").with_values({"mass.relative_error": 0.15})
-    return Driving.of(drive(heavy, manoeuvres.double_lane_change((20.0, 24.0, 28.0)), seed=5))
+    return Driving.of(
+        drive(heavy, manoeuvres.double_lane_change((20.0, 24.0, 28.0)), seed=5, rate_hz=50.0)
+    )
 
 
 @pytest.fixture(scope="module")

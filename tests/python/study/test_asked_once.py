@@ -136,7 +136,7 @@ def test_a_lag_far_below_is_not_followed_and_any_other_to_the_same_end(
 ) -> None:
     car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
     # So many samples that a thinned problem leads.
-    fit = identify(start, drive(car, manoeuvres.lap(32.0), seed=5), starts=1)
+    fit = identify(start, drive(car, manoeuvres.lap(32.0), seed=5, rate_hz=50.0), starts=1)
     model = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
     found = refine_above(model, fit.driving, fit)
     assert found is not None
@@ -157,7 +157,7 @@ def test_a_lag_that_cannot_gain_enough_is_left_before_it_is_climbed(
     start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
-    fit = identify(start, drive(car, manoeuvres.lap(20.0), seed=5), starts=1)
+    fit = identify(start, drive(car, manoeuvres.lap(20.0), seed=5, rate_hz=50.0), starts=1)
     model = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
     there = refine_above(model, fit.driving, fit)
     assert there is not None
@@ -212,7 +212,7 @@ def test_effects_that_are_fitted_together_are_left_where_one_comes_to_nothing(
     start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
-    fit = identify(start, drive(car, manoeuvres.lap(32.0), seed=5), starts=1)
+    fit = identify(start, drive(car, manoeuvres.lap(32.0), seed=5, rate_hz=50.0), starts=1)
     lag = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
     both = lag.add("tyre_relaxation").with_values({"tyre_relaxation.relaxation_length_m": 0.3})
     whole = refine(lag, fit.driving, fit.noise)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, InvalidInput, Log, compare
+from sysid_vehicle import Fit, InvalidInput, Log, Model, compare
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving, turning, turning_blocks
 from sysid_vehicle.identify.ahead.ahead import of_few
@@ -31,8 +31,11 @@ from sysid_vehicle.study.validation import AHEAD, at_its_best
 @pytest.fixture(scope="module")
 def late(fit: Fit) -> Fit:
     """The car, answered by a steering that it has not."""
-    model = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.15})
-    return replace(fit, model=model)
+    return replace(fit, model=answered_late(fit.model))
+
+
+def answered_late(model: Model) -> Model:
+    return model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.15})
 
 
 def test_errors_are_in_the_units_of_the_channels(fit: Fit, late: Fit, course: Log) -> None:
@@ -171,9 +174,9 @@ def test_the_speed_ahead_is_no_error_of_the_model_where_no_wheel_force_is_known(
 
 
 def test_parameters_that_serve_one_step_at_the_price_of_seconds_are_not_taken(
-    fit: Fit, course: Log, monkeypatch: pytest.MonkeyPatch
+    fine_fit: Fit, fine_course: Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    driving = Driving.of(course)
+    fit, driving = fine_fit, Driving.of(fine_course)
 
     def served(fit: Fit, test: Driving, like: Fit) -> SimpleNamespace:
         return SimpleNamespace(model=fit.model.with_values({"D_front": 0.3}))
@@ -230,8 +233,10 @@ def test_what_loses_the_car_has_no_share(fit: Fit, course: Log) -> None:
 
 
 def test_one_spin_decides_no_share(
-    fit: Fit, late: Fit, course: Log, altered: Callable[..., Log]
+    fine_fit: Fit, late: Fit, fine_course: Log, altered: Callable[..., Log]
 ) -> None:
+    fit, course = fine_fit, fine_course
+    late = replace(fit, model=answered_late(fit.model))
     yaw = course["yaw_rate_radps"].copy()
     yaw[len(yaw) // 2 :][:200] += 3.0
     spun = Driving.of(altered(course, yaw_rate_radps=yaw))

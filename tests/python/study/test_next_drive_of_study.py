@@ -22,7 +22,7 @@ def late(truth: sv.Model) -> sv.Model:
 @pytest.fixture(scope="module")
 def logs(late: sv.Model) -> list[sv.Log]:
     ramp = sv.manoeuvres.ramp_steer((18.0, 27.0), 8.0, 4.0)
-    course = sv.manoeuvres.handling_course(30.0, 8.0)
+    course = sv.manoeuvres.handling_course(16.0, 8.0)
     return [sv.drive(late, m, seed=41 + i, rate_hz=50.0) for i, m in enumerate((ramp, course))]
 
 

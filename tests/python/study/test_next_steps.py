@@ -35,7 +35,7 @@ from sysid_vehicle.study.results.sentences import ahead, in_the_end, small
 
 @pytest.fixture(scope="module")
 def adequate(start: Model, truth: Model) -> Study:
-    train, test = (drive(truth, manoeuvres.lap(20.0), seed=s) for s in (61, 62))
+    train, test = (drive(truth, manoeuvres.lap(20.0), seed=s, rate_hz=50.0) for s in (61, 62))
     return improve(start, train, test, candidates=["mass", "steer_lag"], starts=1)
 
 
@@ -145,7 +145,7 @@ def test_only_what_the_driving_leaves_open_asks_for_harder_driving(unknown: Stud
 
 def test_drives_that_tell_another_car_are_said_to(unknown: Study, truth: Model) -> None:
     gripping = truth.with_values({"B_front": 1.4 * truth.value("B_front")})
-    other = Driving.of(drive(gripping, manoeuvres.lap(20.0), seed=65))
+    other = Driving.of(drive(gripping, manoeuvres.lap(20.0), seed=65, rate_hz=50.0))
     found = replace(unknown, validation=other)
     first = found.disagreements[0]
     assert first.train.name == "cornering stiffness front"
@@ -158,7 +158,7 @@ def test_drives_that_tell_another_car_are_said_to(unknown: Study, truth: Model) 
 
 def test_drives_of_one_car_agree(adequate: Study, truth: Model) -> None:
     for seed in (66, 67, 68):
-        other = Driving.of(drive(truth, manoeuvres.handling_course(20.0), seed=seed))
+        other = Driving.of(drive(truth, manoeuvres.handling_course(20.0), seed=seed, rate_hz=50.0))
         assert disagreements(adequate.fit, other) == ()
 
 
@@ -166,7 +166,10 @@ def test_offsets_that_differ_from_log_to_log_are_no_disagreement(truth: Model) -
     biased = truth.add("accelerometer_bias")
     logs = [
         drive(
-            biased.with_values({"accelerometer_bias.ay_mps2": bias}), manoeuvres.lap(20.0), seed=69
+            biased.with_values({"accelerometer_bias.ay_mps2": bias}),
+            manoeuvres.lap(20.0),
+            seed=69,
+            rate_hz=50.0,
         )
         for bias in (0.25, -0.25)
     ]

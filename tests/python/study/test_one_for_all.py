@@ -11,6 +11,11 @@ NAMES = ("force_gain", "yaw_inertia", "aero_drag")
 
 
 @pytest.fixture(scope="module")
+def lap(truth: Model) -> Log:
+    return drive(truth, manoeuvres.lap(40.0), seed=1, rate_hz=50.0)
+
+
+@pytest.fixture(scope="module")
 def heavy(start: Model, lap: Log) -> Fit:
     """Of a vehicle file whose mass is 10 % too large."""
     car = start.vehicle
@@ -47,13 +52,16 @@ def test_nothing_is_said_where_all_was_sought_or_one_effect_found(heavy: Fit) ->
 def test_effects_with_causes_of_their_own_are_no_one_error(start: Model, truth: Model) -> None:
     found = ("aero_drag", "steer_offset")
     hidden = {"aero_drag.drag_area_m2": 0.3, "steer_offset.offset_rad": 0.002}
-    log = drive(truth.add(*found).with_values(hidden), manoeuvres.lap(40.0), seed=531006)
+    log = drive(
+        truth.add(*found).with_values(hidden), manoeuvres.lap(40.0), seed=531006, rate_hz=50.0
+    )
     fit = identify(start, log, starts=1)
     final = refine(fit.model.add(*found), fit.driving, fit.noise)
     assert one_for_all(fit, final, found, all_but(fit, "mass", "force_gain"), USUAL) == ""
 
 
-def test_a_study_warns_of_it(heavy: Fit, lap: Log, course: Log) -> None:
+def test_a_study_warns_of_it(heavy: Fit, lap: Log, truth: Model) -> None:
+    course = drive(truth, manoeuvres.handling_course(20.0, 7.5), seed=2, rate_hz=50.0)
     with pytest.warns(SysidWarning) as caught:
         found = improve(heavy.model, lap, course, starts=1, candidates=["force_gain", "aero_drag"])
     assert [a.id for a in found.added] == ["force_gain", "aero_drag"]

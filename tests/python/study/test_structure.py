@@ -29,7 +29,7 @@ def test_nothing_is_said_of_a_drive_in_which_nothing_happens() -> None:
 def test_a_missing_drag_is_seen_in_the_speed_ahead() -> None:
     car = sv.Model(sv.example_vehicle())
     draggy = car.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.45})
-    drives = [sv.drive(draggy, sv.manoeuvres.lap(), seed=s) for s in (530219, 530220)]
+    drives = [sv.drive(draggy, sv.manoeuvres.lap(), seed=s, rate_hz=50.0) for s in (530219, 530220)]
     found = structure(sv.identify(car, drives[0]), Driving.of(drives[1]))
     assert found.test["error of v_x 1 s ahead"].low > 0.8
     assert found.test["error of v_x 5 s ahead"].low > 0.8

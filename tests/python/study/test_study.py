@@ -100,6 +100,8 @@ def test_the_steps_belong_together(study: Study) -> None:
     assert len(study.train) == len(study.test) == len(study.fits)
     assert len(study.diagnoses) == 2
     assert study.diagnoses[1].significant == ()
+    assert study.full == ()
+    assert not any("as many effects" in w for w in study.warnings)
     assert study.seconds > 0.0
 
 

@@ -87,8 +87,8 @@ def test_what_fits_to_the_last_digit_alike_is_no_alternative(dx: Diagnosis) -> N
 def test_a_slope_and_a_bias_give_way_to_rolling_resistance(start: Model, truth: Model) -> None:
     """Beside the slope the bias does to the last digit what rolling resistance does alone."""
     car = truth.add("rolling_resistance").with_values({"rolling_resistance.coefficient": 0.02})
-    driving = Driving.of(drive(car, manoeuvres.lap(30.0), seed=63))
-    test = Driving.of(drive(car, manoeuvres.handling_course(30.0), seed=64))
+    driving = Driving.of(drive(car, manoeuvres.lap(30.0), seed=63, rate_hz=50.0))
+    test = Driving.of(drive(car, manoeuvres.handling_course(30.0), seed=64, rate_hz=50.0))
     sloping = identify(start.add("road_grade"), driving, starts=1)
     dx = diagnose(sloping, candidates=["accelerometer_bias", "rolling_resistance"])
     bias, rolling = (by_id(dx, name) for name in ("accelerometer_bias", "rolling_resistance"))
@@ -144,8 +144,8 @@ def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     car = truth.add("force_gain").with_values(
         {"force_gain.drive_error": 0.08, "force_gain.brake_error": 0.08}
     )
-    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=21), starts=1)
-    test = Driving.of(drive(car, manoeuvres.lap(30.0), seed=22))
+    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=21, rate_hz=50.0), starts=1)
+    test = Driving.of(drive(car, manoeuvres.lap(30.0), seed=22, rate_hz=50.0))
     dx = diagnose(fit, candidates=["force_gain"])
     (gain,) = (c.fit for c in dx.ranking)
     assert gain is not None
@@ -324,8 +324,10 @@ def test_two_that_may_hold_only_together_are_sought_together(
         "aero_downforce.cl_a_rear_m2": downforce,
     }
     car = truth.add(*both).with_values(values)
-    train = drive(car, manoeuvres.step_steer((17.0, 27.0), (3.0, 6.0)), seed=71)
-    test = Driving.of(drive(car, manoeuvres.handling_course(30.0, lateral_mps2=5.5), seed=72))
+    train = drive(car, manoeuvres.step_steer((17.0, 27.0), (3.0, 6.0)), seed=71, rate_hz=50.0)
+    test = Driving.of(
+        drive(car, manoeuvres.handling_course(30.0, lateral_mps2=5.5), seed=72, rate_hz=50.0)
+    )
     baseline = identify(start, train, starts=1)
     alone = diagnose(baseline, candidates=both)
     first = likeliest(alone)

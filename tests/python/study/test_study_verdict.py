@@ -115,8 +115,8 @@ def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
     )
     study = improve(
         start,
-        drive(car, manoeuvres.sine_sweep(), seed=3),
-        drive(car, manoeuvres.lap(30.0), seed=13),
+        drive(car, manoeuvres.sine_sweep(), seed=3, rate_hz=50.0),
+        drive(car, manoeuvres.lap(30.0), seed=13, rate_hz=50.0),
         candidates=["accelerometer_scale", "gyro_scale", "steer_ratio"],
         starts=2,
     )

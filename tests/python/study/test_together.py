@@ -63,8 +63,8 @@ def test_a_group_with_a_value_that_no_car_has_is_not_added(truth: Model, start: 
     both = ("gyro_bias", "steer_ratio")
     sizes = {"gyro_bias.bias_radps": 0.006, "steer_ratio.ratio_error": -0.36}
     car = truth.add(*both).with_values(sizes)
-    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=81), starts=1)
-    test = Driving.of(drive(car, manoeuvres.lap(25.0), seed=82))
+    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=81, rate_hz=50.0), starts=1)
+    test = Driving.of(drive(car, manoeuvres.lap(25.0), seed=82, rate_hz=50.0))
     dx = diagnose(fit, candidates=[*both, "mass"], refits=0)
     assert both in _leading_subsets(dx, 2)
     assert _with_subset(dx, both) is None
@@ -81,7 +81,7 @@ def test_several_effects_never_end_below_a_model_that_they_contain(
     sizes = {"steer_lag.time_constant_s": 0.08, "gyro_bias.bias_radps": 0.004}
     both = ("steer_lag", "gyro_bias")
     car = truth.add(*both).with_values(sizes)
-    fit = identify(start, drive(car, manoeuvres.lap(20.0), seed=5), starts=1)
+    fit = identify(start, drive(car, manoeuvres.lap(20.0), seed=5, rate_hz=50.0), starts=1)
     lag = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
     single = refine(lag, fit.driving, fit.noise)
     bare, none = fit.model.add(*both), {"steer_lag.time_constant_s": 0.0005}

@@ -21,7 +21,7 @@ def missing(hidden_fit: Callable[[str, float], Fit]) -> Fit:
 def elsewhere(truth: Model) -> Driving:
     """Driving of the same car that no fit saw."""
     car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
-    return Driving.of(drive(car, manoeuvres.handling_course(30.0), seed=8))
+    return Driving.of(drive(car, manoeuvres.handling_course(30.0), seed=8, rate_hz=50.0))
 
 
 def test_what_the_car_has_is_of_use_and_what_acts_on_nothing_is_not(

@@ -34,9 +34,9 @@ def test_the_standard_error_is_that_of_a_sum_however_short_the_driving(
 
 
 def test_one_spin_does_not_hide_what_all_other_pieces_show(
-    course: Log, rng: np.random.Generator
+    fine_course: Log, rng: np.random.Generator
 ) -> None:
-    test = Driving.of(course)
+    test = Driving.of(fine_course)
     steady = rng.normal(0.2, 1.0, test.samples)
     expected = _with_error(steady, test)
     for spin in (-1e6, 1e6):

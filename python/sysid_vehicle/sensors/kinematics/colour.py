@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -47,6 +49,11 @@ class Colour:
         for k, phi in enumerate(self.phi, start=1):
             diagonals.append(np.where(full, -phi / self.white_std, 0.0)[k:])
         return scipy.sparse.diags(diagonals, -np.arange(p + 1), shape=(n, n), format="csr")
+
+    def whitened(self, run: IntArray, *of: Any) -> Iterator[Any]:
+        """Vectors or matrices of n rows times the whitener, which is a number of white noise."""
+        a = self.whitener(run) if self.phi.size else 1.0 / self.white_std
+        return (a @ rows if self.phi.size else a * rows for rows in of)
 
     def words(self, rate_hz: float) -> str:
         """Say where in frequency the noise lies."""

@@ -8,6 +8,7 @@ Vehicle System Identification, ch. 10). No tyre, mass or inertia stands in it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ import scipy
 
 from ..._common.arrays import FloatArray
 from ...vehicle import GRAVITY_MPS2
-from .motion import Basis, Grid, IntArray
+from .motion import QUICK, SLOW, Basis, Grid, IntArray
 
 
 @dataclass(frozen=True)
@@ -118,9 +119,15 @@ class Readings:
 
 
 def predict(
-    readings: Readings, grid: Grid, x: FloatArray, faults: dict[str, float]
+    readings: Readings,
+    grid: Grid,
+    x: FloatArray,
+    faults: dict[str, float],
+    calm: FloatArray | None = None,
 ) -> tuple[FloatArray, scipy.sparse.csr_matrix, dict[str, FloatArray]]:
     """Return what the channel should read, and the derivatives.
+
+    Those against the faults are taken from the motion `calm`, where it is given.
 
     Returns
     -------
@@ -129,7 +136,11 @@ def predict(
     by_fault : dict of ndarray, shape (n,)
         Of the faults in `faults` that move this channel.
     """
-    expected, blocks, by_fault = _read(readings, grid, x, faults)
+    places = _Places(readings, grid, faults)
+    expected, told, by_fault = _read(readings, places, x, faults)
+    blocks = told()
+    if calm is not None:
+        by_fault = _read(readings, places, calm, faults)[2]
     columns = np.concatenate([c for c, _ in blocks], axis=1)
     weights = np.concatenate([w for _, w in blocks], axis=1)
     n, k = columns.shape
@@ -139,34 +150,53 @@ def predict(
     return expected, by_motion, by_fault
 
 
-def moved_by(
+def expected_of(
     readings: Readings, grid: Grid, x: FloatArray, faults: dict[str, float]
-) -> dict[str, FloatArray]:
-    """As `predict`: the derivatives against the faults alone."""
-    return _read(readings, grid, x, faults)[2]
+) -> FloatArray:
+    """As `predict`: what the channel should read alone."""
+    return _read(readings, _Places(readings, grid, faults), x, faults)[0]
+
+
+class _Places:
+    """Which splines act on the readings of a channel whose time is put right, and how much."""
+
+    def __init__(self, readings: Readings, grid: Grid, faults: dict[str, float]) -> None:
+        name = readings.channel
+        late_s = faults.get(f"delay.{name}", 0.0)
+        if name in _SPEEDS:
+            late_s += faults.get("delay.speeds", 0.0)
+        self.share, self.lean_s = lean(name, faults)
+        late_s += self.share * self.lean_s
+        time_s = readings.time_s - late_s
+        signals = _NEEDS[name]
+        self.quick = grid.quick(readings.stretch, time_s)
+        self.at = {s: grid.columns(s, self.quick) for s in signals if s in QUICK}
+        for signal in signals:
+            if signal in SLOW:
+                self.slow = grid.slow(readings.stretch, time_s)
+                self.slow_at = grid.columns(signal, self.slow)
+
+
+_Blocks = Callable[[], list[tuple[IntArray, FloatArray]]]
 
 
 def _read(
-    readings: Readings, grid: Grid, x: FloatArray, faults: dict[str, float]
-) -> tuple[FloatArray, list[tuple[IntArray, FloatArray]], dict[str, FloatArray]]:
+    readings: Readings, places: _Places, x: FloatArray, faults: dict[str, float]
+) -> tuple[FloatArray, _Blocks, dict[str, FloatArray]]:
     """What the channel should read, how the motion moves it in blocks of columns, and faults."""
-    name = readings.channel
-    late_s = faults.get(f"delay.{name}", 0.0)
-    if name in _SPEEDS:
-        late_s += faults.get("delay.speeds", 0.0)
-    share, lean_s = lean(name, faults)
-    late_s += share * lean_s
-    time_s = readings.time_s - late_s
-    quick = grid.quick(readings.stretch, time_s)
+    name, quick = readings.channel, places.quick
+    share, lean_s = places.share, places.lean_s
     if name in ("ax_mps2", "ay_mps2"):
-        expected, blocks, by_fault, rate = _felt(name, readings, grid, x, faults, quick, time_s)
+        expected, blocks, by_fault, rate = _felt(name, readings, places, x, faults)
     else:
-        signal = _NEEDS[name][0]
-        columns = grid.columns(signal, quick)
+        columns = places.at[_NEEDS[name][0]]
         value, rate = _evaluate(x, columns, quick)[:2]
         gain = 1.0 + faults.get(f"gain.{name}", 0.0)
         expected = gain * value + faults.get(f"bias.{name}", 0.0)
-        blocks = [(columns, gain * quick.weights[0])]
+
+        def blocks() -> list[tuple[IntArray, FloatArray]]:
+            return [(columns, gain * quick.weights[0])]
+
         by_fault = {f"gain.{name}": value, f"bias.{name}": np.ones_like(value)}
     by_fault[f"delay.{name}"] = -rate
     if share:
@@ -199,14 +229,12 @@ def _evaluate(
 def _felt(
     name: str,
     readings: Readings,
-    grid: Grid,
+    places: _Places,
     x: FloatArray,
     faults: dict[str, float],
-    quick: Basis,
-    time_s: FloatArray,
-) -> tuple[FloatArray, list[tuple[IntArray, FloatArray]], dict[str, FloatArray], FloatArray]:
+) -> tuple[FloatArray, _Blocks, dict[str, FloatArray], FloatArray]:
     """What an accelerometer feels: at its place, turned, on a road that is not level."""
-    at = {signal: grid.columns(signal, quick) for signal in ("vx", "vy", "yaw")}
+    quick, at = places.quick, places.at
     vx, dvx, ddvx = _evaluate(x, at["vx"], quick)
     vy, dvy, ddvy = _evaluate(x, at["vy"], quick)
     r, dr, ddr = _evaluate(x, at["yaw"], quick)
@@ -219,25 +247,25 @@ def _felt(
     gain = 1.0 + faults.get(f"gain.{name}", 0.0)
     # Shares of the two accelerations in what this axis feels.
     cx, cy = (gain, turn) if is_x else (-turn, gain)
-    slow_signal = "grade" if is_x else "bank"
-    slow = grid.slow(readings.stretch, time_s)
-    slow_at = grid.columns(slow_signal, slow)
+    slow, slow_at = places.slow, places.slow_at
     level, d_level, _ = _evaluate(x, slow_at, slow)
     value, slope, _ = quick.weights
 
     def times(factor: FloatArray, weights: FloatArray) -> FloatArray:
         return factor[:, None] * weights
 
-    blocks = [
-        (at["vx"], cx * slope + times(cy * r, value)),
-        (at["vy"], times(-cx * r, value) + cy * slope),
-        (
-            at["yaw"],
-            times(cx * (-vy - 2 * lx * r) + cy * (vx - 2 * ly * r), value)
-            + (cy * lx - cx * ly) * slope,
-        ),
-        (slow_at, slow.weights[0]),
-    ]
+    def blocks() -> list[tuple[IntArray, FloatArray]]:
+        return [
+            (at["vx"], cx * slope + times(cy * r, value)),
+            (at["vy"], times(-cx * r, value) + cy * slope),
+            (
+                at["yaw"],
+                times(cx * (-vy - 2 * lx * r) + cy * (vx - 2 * ly * r), value)
+                + (cy * lx - cx * ly) * slope,
+            ),
+            (slow_at, slow.weights[0]),
+        ]
+
     by_fault = {
         f"gain.{name}": along if is_x else across,
         "turn": across if is_x else -along,

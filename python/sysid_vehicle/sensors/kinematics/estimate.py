@@ -28,7 +28,7 @@ from .equations import FAULTS, Readings, predict
 from .motion import QUICK, SLOW, Grid
 from .one_sided import OneSided
 from .road import Unevenness
-from .system import Band, Linearised, drawn, linearise, normal_equations
+from .system import Band, drawn, linearise, normal_equations, whitened_errors
 
 _ROUNDS = 30
 _LEAST_ROUNDS = 8
@@ -160,12 +160,13 @@ def estimate(
     x, colours = _begin(readings, grid, floors)
     uneven = {signal: Unevenness(grid.steps(signal)) for signal in SLOW}
     gains = OneSided(names)
-    settled = False
+    settled, road = False, dict[str, float]()
     for count in range(1, _ROUNDS + 1):
         check_time()
         system = linearise(readings, grid, x, faults, colours, runs, calm=grid.smoothed(x))
-        road = {signal: slope.std_mps2 for signal, slope in uneven.items()}
-        rows = _rows(readings, grid, road)
+        before, road = road, {signal: slope.std_mps2 for signal, slope in uneven.items()}
+        if road != before:
+            rows = _rows(readings, grid, road)
         now = np.array([faults[name] for name in names])
         # Cauchy's prior at its present curvature.
         prior = np.diag(2.0 / (typical**2 + now**2) + most**-2.0)
@@ -254,15 +255,12 @@ def _misfit(readings: Sequence[Readings], found: Estimate, noise: Estimate) -> f
     runs = {r.channel: neighbours(r.stretch, r.time_s) for r in readings}
     rows = _rows(readings, found.grid, noise.road_mps2)
 
-    def at(x: FloatArray) -> Linearised:
-        return linearise(readings, found.grid, x, found.faults, noise.colours, runs)
-
+    system = linearise(readings, found.grid, found.x, found.faults, noise.colours, runs)
     none = np.zeros(len(found.faults))
-    x = found.x + normal_equations(at(found.x), rows, found.x, np.eye(none.size), none).motion_step
-    system = at(x)
+    x = found.x + normal_equations(system, rows, found.x, np.eye(none.size), none).motion_step
+    left = whitened_errors(readings, found.grid, x, found.faults, noise.colours, runs)
     total = 0.5 * float(np.sum((rows @ x) ** 2))
-    for channel, white in system.white.items():
-        weight = system.weights[channel]
+    for white, weight in left.values():
         total += float(np.sum((1.0 / weight - 0.5) * (weight * white) ** 2))  # Huber's
     return total
 
