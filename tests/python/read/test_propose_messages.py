@@ -104,3 +104,23 @@ def test_fields_of_a_message_that_came_late_are_told_once() -> None:
     told = [str(w.message) for w in said if "came late" in str(w.message)]
     assert len(told) == 1
     assert "yaw_rate_radps and 2 more: 1 samples came late" in told[0]
+
+
+def test_a_specific_force_is_no_force(log: sv.Log) -> None:
+    columns = {c: log[c] for c in log.channels if c not in ("ax_mps2", "ay_mps2", "fx_n")}
+    columns["/imu/specific_force/x"], columns["/imu/specific_force/y"] = (
+        log["ax_mps2"],
+        log["ay_mps2"],
+    )
+    found = sv.propose_channels(columns).channels
+    assert found["ax_mps2"].column == "/imu/specific_force/x"
+    assert found["ay_mps2"].column == "/imu/specific_force/y"
+    assert "fx_n" not in found
+
+
+def test_the_stamp_of_a_message_is_no_channel() -> None:
+    from sysid_vehicle.read.formats.messages import numbers
+
+    stamp = {"seconds": 1_700_000_000, "nanos": 5}
+    message = {"timestamp": stamp, "angle_deg": 3.0, "state": {"timestamp": 4.5}}
+    assert [path for path, _ in numbers(message)] == ["angle_deg", "state/timestamp"]

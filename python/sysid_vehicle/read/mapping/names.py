@@ -56,7 +56,8 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"inline acc\w*|laengs ?beschl\w*|langsversnelling|\blon(g|gi)?acc?\b",
         r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
         r"^(imu|ins|body) a ?x$",
-        r"\bacc (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
+        r"\bacc\w* (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
+        r"\bspecific force (x|long\w*)$",
     ),
     "ay_mps2": (
         r"^a ?y( cg)?( mps2)?$|acc ?y$|y acc\w*$",
@@ -64,7 +65,8 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"\blatacc?\b",
         r"^ace?l\w* (lat|trans)\w*|^acc?el\w* trans\w*|dwarsversnelling",
         r"^(imu|ins|body) a ?y$",
-        r"\bacc (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
+        r"\bacc\w* (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
+        r"\bspecific force (y|lat\w*)$",
     ),
     "steer_rad": (
         r"road ?wheel( angle)?$|^steer rad$|front wheel angle",
@@ -101,7 +103,7 @@ _REFUSED: dict[str, str] = {
     "ax_mps2": r"\b(yaw|lat\w*|vert\w*|angular|covariance|target)\b",
     "ay_mps2": r"\b(yaw|long\w*|vert\w*|angular|covariance|target)\b",
     "steer_rad": r"\b(torque|rate|speed|vel\w*|moment|target|force|motor|current|rear)\b",
-    "fx_n": r"\b(fl|fr|rl|rr|brake|steer\w*)\b",
+    "fx_n": r"\b(fl|fr|rl|rr|brake|steer\w*|specific)\b",
     **dict.fromkeys(
         ("east", "north", "heading", "course"),
         r"\b(std\w*|accuracy|cov\w*|error|sigma|rate|acc\w*|target|ref\w*|wind)\b",
