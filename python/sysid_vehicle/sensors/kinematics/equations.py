@@ -59,6 +59,12 @@ SWING_STD_S2 = 0.5 * math.radians(4.0) / GRAVITY_MPS2
 SWINGS = {"swing.slow": 1.2, "swing.quick": 2.2}
 """Faults by a body that swings, with natural frequencies that are spread as those of cars [Hz]."""
 
+# Standard deviation of the slip of wheels per acceleration [s2/m]: a car's mass over the slip
+# stiffness of the tyres of an axle.
+SLIP_STD_S2PM = 0.01
+SLIPS = ("slip.driven", "slip.braked")
+"""Faults by wheels whose speed is logged and that slip."""
+
 FAULTS = {
     kind.name: kind
     for kind in (
@@ -79,6 +85,7 @@ FAULTS = {
         FaultKind("lean.ay_mps2", "ay_mps2", 1e3, LEAN_STD_S),
         # The body rolls as an oscillator, and an IMU above the speed sensor swings with it.
         *(FaultKind(name, "ay_mps2", 1e3, SWING_STD_S2) for name in SWINGS),
+        *(FaultKind(name, "vx_mps", 1e3, SLIP_STD_S2PM) for name in SLIPS),
     )
 }
 _SPEEDS = ("vx_mps", "vy_mps")  # of one device as a rule
@@ -108,6 +115,8 @@ class Readings:
     swings : ndarray, shape (n, len(SWINGS)), optional
         Second derivatives of what should have been written [m/s4], as a body follows it that
         swings, of an axis that feels them (`swing.py`).
+    slips : ndarray, shape (n, len(SLIPS)), optional
+        What slip adds to a speed of wheels (`slip.py`).
     """
 
     channel: str
@@ -115,6 +124,7 @@ class Readings:
     time_s: FloatArray
     values: FloatArray
     swings: FloatArray | None = None
+    slips: FloatArray | None = None
 
 
 def predict(
@@ -168,6 +178,10 @@ def _read(
         expected = gain * value + faults.get(f"bias.{name}", 0.0)
         blocks = [(columns, gain * quick.weights[0])]
         by_fault = {f"gain.{name}": value, f"bias.{name}": np.ones_like(value)}
+        if readings.slips is not None:
+            for kind, slip in zip(SLIPS, readings.slips.T, strict=True):
+                expected = expected + faults.get(kind, 0.0) * slip
+                by_fault[kind] = slip
     by_fault[f"delay.{name}"] = -rate
     if share:
         by_fault[f"lean.{name}"] = -share * rate
