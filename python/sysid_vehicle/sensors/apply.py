@@ -44,7 +44,7 @@ def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArra
         known = np.isfinite(log["ax_mps2"])
         felt = smoothed(log["time_s"][known], log["ax_mps2"][known], log["time_s"])
         size = np.array([found.get(name, 0.0) for name in SLIPS])
-        now["vx_mps"] = values("vx_mps") - slips_of(values("vx_mps"), felt) @ size
+        now["vx_mps"] = values("vx_mps") / (1.0 + slips_of(felt) @ size)
         what.append("vx_mps: slip of the wheels taken out")
     for channel, names in LATE.items():
         late_s = sum(found.get(name, 0.0) for name in names)

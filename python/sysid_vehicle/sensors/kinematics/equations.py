@@ -116,7 +116,7 @@ class Readings:
         Second derivatives of what should have been written [m/s4], as a body follows it that
         swings, of an axis that feels them (`swing.py`).
     slips : ndarray, shape (n, len(SLIPS)), optional
-        What slip adds to a speed of wheels (`slip.py`).
+        What the slip of wheels grows with [m/s2] (`slip.py`).
     """
 
     channel: str
@@ -175,13 +175,17 @@ def _read(
         columns = grid.columns(signal, quick)
         value, rate = _evaluate(x, columns, quick)[:2]
         gain = 1.0 + faults.get(f"gain.{name}", 0.0)
-        expected = gain * value + faults.get(f"bias.{name}", 0.0)
-        blocks = [(columns, gain * quick.weights[0])]
         by_fault = {f"gain.{name}": value, f"bias.{name}": np.ones_like(value)}
+        weights = quick.weights[0]
         if readings.slips is not None:
-            for kind, slip in zip(SLIPS, readings.slips.T, strict=True):
-                expected = expected + faults.get(kind, 0.0) * slip
-                by_fault[kind] = slip
+            by_fault |= {
+                kind: gain * value * slip
+                for kind, slip in zip(SLIPS, readings.slips.T, strict=True)
+            }
+            slipped = 1.0 + readings.slips @ np.array([faults.get(kind, 0.0) for kind in SLIPS])
+            value, weights = value * slipped, slipped[:, None] * weights
+        expected = gain * value + faults.get(f"bias.{name}", 0.0)
+        blocks = [(columns, gain * weights)]
     by_fault[f"delay.{name}"] = -rate
     if share:
         by_fault[f"lean.{name}"] = -share * rate

@@ -28,16 +28,13 @@ def with_slips(speed: Readings, along: Readings) -> Readings:
         own, of = speed.stretch == stretch, along.stretch == stretch
         time_s = speed.time_s[own]
         if np.any(of):
-            felt = smoothed(along.time_s[of], along.values[of], time_s)
-            slips[own] = slips_of(speed.values[own], felt)
+            slips[own] = slips_of(smoothed(along.time_s[of], along.values[of], time_s))
     return replace(speed, slips=as_float64(slips))
 
 
-def slips_of(speed_mps: FloatArray, along_mps2: FloatArray) -> FloatArray:
-    """What each of `SLIPS` adds to a speed per unit of it, shape (n, 2) [m2/s3]."""
-    return np.column_stack(
-        [speed_mps * np.maximum(along_mps2, 0.0), speed_mps * np.minimum(along_mps2, 0.0)]
-    )
+def slips_of(along_mps2: FloatArray) -> FloatArray:
+    """The share that each of `SLIPS` adds to a speed per unit of it, shape (n, 2) [m/s2]."""
+    return np.column_stack([np.maximum(along_mps2, 0.0), np.minimum(along_mps2, 0.0)])
 
 
 def smoothed(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
