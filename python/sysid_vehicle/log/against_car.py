@@ -15,8 +15,8 @@ import numpy as np
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput, warn
 from ..vehicle import GRAVITY_MPS2
-from .laws.laws import EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, spread_of
-from .laws.longitudinal import ramp_on
+from .laws.laws import CLEARLY, EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, fit, ones, spread_of
+from .laws.longitudinal import DRAG_PER_M, ramp_on
 from .laws.motion import Motion
 from .laws.regression import size_of
 from .log import Log
@@ -24,6 +24,7 @@ from .log import Log
 _MOVING = 5.0  # m/s, with a wheelbase of `_USUAL_M`: slip and curvature are alike at like v^2 / L
 _USUAL_M = 2.6
 _MIN_WINDOWS = 12
+_FEWEST = 4  # windows in which the car brakes
 _SETTLING = 1  # windows before and after harder driving
 _FAR = 2.5  # times the usual steering: beyond it an angle counts as that much
 _SURE = 3.0  # deviations
@@ -94,6 +95,8 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
     drive = _driven(columns, log.rate_hz, wheelbase_m)
     if drive is None:
         return
+    if log.has("fx_n"):
+        _refuse_without_brakes(log, drive, mass_kg)
     mass = _mass(drive, mass_kg) if log.has("fx_n") else None
     if mass is not None and mass.off(_FORCE_FACTOR, _FORCE_STD):
         likely = _likely(mass, _MASS_SLIPS) or (
@@ -159,6 +162,36 @@ def _mass(drive: Drive, mass_kg: float) -> _Told | None:
         return None
     ratio, deviation = mass_kg * inverse, _SURE * float(found.deviations[0]) / inverse
     return _Told(ratio, ratio / (1.0 + deviation), ratio * (1.0 + deviation), drive.place(force))
+
+
+def _refuse_without_brakes(log: Log, drive: Drive, mass_kg: float) -> None:
+    """Refuse a wheel force that drives the car as its mass asks for, and hardly brakes it.
+
+    It is that of the engine or motor: with one mass for both, the car would seem to be lighter.
+    """
+    ramp, force, _ = ramp_on(drive, "fx_n")
+    columns = [force, drive.mean(drive.motion.channels["vx_mps"] ** 2), ones(drive)]
+    pulled = ramp > -EXCITED
+    if np.count_nonzero(pulled) < _MIN_WINDOWS:
+        return
+    law = fit(ramp[pulled], [c[pulled] for c in columns], [np.inf, DRAG_PER_M, np.inf])
+    inverse, drag, slope = law.coefficients
+    if law.coherence < _COHERENT or not 1.0 < _FORCE_FACTOR * inverse * mass_kg < _FORCE_FACTOR**2:
+        return
+    braked = drag * columns[1] + slope - ramp
+    hard = braked > CLEARLY
+    if np.count_nonzero(hard) < _FEWEST:
+        return
+    share = -float(inverse * force[hard] @ braked[hard]) / float(np.sum(braked[hard] ** 2))
+    if share * _FORCE_FACTOR > 1.0:
+        return
+    instead = ', or leave it out, as log.without("fx_n") does: ax_mps2 takes its place'
+    place = drive.place(np.where(hard, braked, 0.0))
+    raise InvalidInput(
+        f"{log.name}: fx_n holds what drives the car in full, and {100.0 * max(share, 0.0):.2g} % "
+        f"of what brakes it, {place}: the force of the brakes is missing; add it to fx_n"
+        f"{instead if log.has('ax_mps2') else ''}"
+    )
 
 
 def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:

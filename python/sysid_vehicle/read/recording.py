@@ -133,9 +133,11 @@ class Recording:
     def signals(self, names: list[str], notes: list[str]) -> dict[str, Signal]:
         """Read some channels, their samples in the order of time."""
         found = self.fetch(names, notes) if names else {}  # to libraries none are all
-        told: dict[str, str] = {}
+        told: dict[str, list[str]] = {}
         result = {name: _ordered(name, found[name], told) for name in names}
-        notes += told.values()
+        for text, which in told.items():  # once of what shares its times, as a message's fields do
+            more = f" and {len(which) - 1} more" if len(which) > 1 else ""
+            notes.append(f"{which[0]}{more}: {text}")
         return result
 
     def table(self, wanted: Mapping[str, str], absent: Iterable[str], notes: list[str]) -> Table:
@@ -295,7 +297,7 @@ def _spread(values: FloatArray, rows: npt.NDArray[np.intp], n: int) -> FloatArra
     return result
 
 
-def _ordered(name: str, signal: Signal, told: dict[str, str]) -> Signal:
+def _ordered(name: str, signal: Signal, told: dict[str, list[str]]) -> Signal:
     """Return the samples in the order of their times, each time once."""
     time_s, values = counted_on(signal.time_s), signal.values
     step = np.diff(time_s)
@@ -317,5 +319,6 @@ def _ordered(name: str, signal: Signal, told: dict[str, str]) -> Signal:
     repeated = int(fresh.size - np.count_nonzero(fresh))
     what = [f"{swapped} samples came late and were sorted"] if swapped else []
     what += [f"{repeated} samples repeat the time of another and were left out"] if repeated else []
-    told.setdefault(name, f"{name}: {' and '.join(what)}, first at sample {k}; check the recorder")
+    text = f"{' and '.join(what)}, first at sample {k}; check the recorder"
+    told.setdefault(text, []).append(name)
     return Signal(time_s[fresh], values[fresh])

@@ -123,7 +123,8 @@ FORMATS: tuple[Format, ...] = (
         (b"#ROSBAG V", b"SQLite format 3"),
         extra="ros",
         libraries=("rosbags",),
-        mend="mend it with rosbag reindex or ros2 bag reindex, or record it again",
+        mend="mend it with rosbag reindex or ros2 bag reindex, a data base that is malformed with "
+        "sqlite3 old.db3 .recover | sqlite3 new.db3, or record it again",
     ),
     Format(
         "a CAN log",

@@ -10,6 +10,8 @@ import scipy
 from .._common.arrays import FloatArray, filled
 from ..log import Log, Retimed, interpolated
 from .faults import SensorFault
+from .kinematics.equations import SLIPS
+from .kinematics.slip import slips_of, smoothed
 
 _SMOOTH_S = 0.2  # yaw acceleration is that of a parabola over this time
 # What makes a channel late.
@@ -38,6 +40,12 @@ def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArra
     def values(channel: str) -> FloatArray:
         return now.get(channel, log[channel])
 
+    if any(name in found for name in SLIPS) and log.has("ax_mps2"):
+        known = np.isfinite(log["ax_mps2"])
+        felt = smoothed(log["time_s"][known], log["ax_mps2"][known], log["time_s"])
+        size = np.array([found.get(name, 0.0) for name in SLIPS])
+        now["vx_mps"] = values("vx_mps") / (1.0 + slips_of(felt) @ size)
+        what.append("vx_mps: slip of the wheels taken out")
     for channel, names in LATE.items():
         late_s = sum(found.get(name, 0.0) for name in names)
         if late_s and log.has(channel):

@@ -18,10 +18,11 @@ from ..log import Log, several_logs
 from ..vehicle import Vehicle
 from .condition import Conditioning
 from .faults import FALSE_CLAIMS, Rival, SensorFault, doubted, faults_of
-from .kinematics.equations import FAULTS, SWINGS, Readings
+from .kinematics.equations import FAULTS, SLIPS, SWINGS, Readings
 from .kinematics.estimate import Estimate, estimate, noise_of, preferred
 from .kinematics.motion import Grid, Stretch
 from .kinematics.parts import cut
+from .kinematics.slip import with_slips
 from .kinematics.swing import swings_as, with_swings
 from .result import SensorCheck
 from .signals import MOVING, Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
@@ -32,9 +33,9 @@ _MEAN_S = 0.03  # quick channels enter as means over so long
 _STEP_MEANS = 2.3607
 _STEP_SAMPLES = 1.618  # of a channel that is slower than that
 _SEARCHES = 1  # for a better explanation, from one that does without a fault
-# Nats by which a body that swings has to be likelier. By two parameters more a likelihood gains as
-# much by chance as often as a fault is claimed by chance.
-_SWINGS = -math.log(FALSE_CLAIMS)
+# Nats by which a body that swings or wheels that slip have to be likelier. By two parameters more a
+# likelihood gains as much by chance as often as a fault is claimed by chance.
+_LIKELIER = -math.log(FALSE_CLAIMS)
 _FLOOR = 1e-3  # least noise, of the channel's standard deviation
 
 Told = Callable[[Estimate, Sequence[SensorFault]], bool]
@@ -101,8 +102,8 @@ def checked(
 
     `told` are signals of the logs as they were read, by default of these. `enough` is asked with
     this estimate and the faults that it tells. Parts of the driving only take claims back;
-    explanations without a fault do too, unless one of them is the better one. So does a body that
-    swings: in the place of one fault, or of all, where that is likelier.
+    explanations without a fault do too, unless one of them is the better one. So do a body that
+    swings and wheels that slip: in the place of one fault, or of all, where that is likelier.
     """
     stretches = pieces(together)
     readings = readings_of(together, stretches)
@@ -126,15 +127,16 @@ def checked(
         names = [name for name in _names(have) if name not in without]
         return estimate(slow, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
 
-    lacks = frozenset(SWINGS)
+    lacks = frozenset((*SWINGS, *SLIPS))
     found = of([averaged(r, _MEAN_S) for r in readings], stretches, lacks)
-    may_swing = lacks <= {*_names(have)}
-    if may_swing:
+    others = [frozenset(kind) for kind in (SLIPS, SWINGS) if {*kind} <= {*_names(have)}]
+    if frozenset(SWINGS) in others:
         readings = [with_swings(r, found) if r.channel == "ay_mps2" else r for r in readings]
+    readings = _slipping(readings)
     means = [averaged(r, _MEAN_S) for r in readings]
 
     def part(some: Sequence[Stretch]) -> list[Readings]:
-        own = readings_of(together, some)
+        own = _slipping(readings_of(together, some))
         swung = [swings_as(r, some, of, stretches) for r, of in zip(own, readings, strict=True)]
         return [averaged(r, _MEAN_S) for r in swung]
 
@@ -156,10 +158,14 @@ def checked(
             names = [fault.name for fault in faults if fault.found]
             rivals = {without: against(found, lacks.union(without)) for without in doubted(names)}
             doubts = dict(rivals)
-            # A body that swings takes the place of a fault, too, where it is likelier.
-            if may_swing:
-                swung = {without: against(found, frozenset(without)) for without in rivals}
-                doubts |= {without: rival for without, rival in swung.items() if rival.worse < 0.0}
+            # What is no fault takes the place of one, too, where it is likelier.
+            for kind in others:
+                beside = {w: against(found, (lacks - kind).union(w)) for w in rivals}
+                doubts |= {
+                    w: rival
+                    for w, rival in beside.items()
+                    if rival.worse < min(0.0, doubts[w].worse) and _may_be(rival.estimate)
+                }
             faults = told_of(found, parts=parts, rivals=doubts)
             best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
             if not left or best is None or best.worse >= 0.0:
@@ -173,11 +179,16 @@ def checked(
 
     faults = told_of(found)
     if not enough(found, faults):
+        claimed = any(fault.found for fault in faults)
         found, faults = explained(found, lacks)
-        if may_swing:
-            swinging = of_all(frozenset())
-            if preferred(means, swinging, found) > _SWINGS:
-                found, faults = explained(swinging, frozenset())
+        for kind in others:
+            # A speed of wheels is only asked for where something is off: most cars have one.
+            if kind <= {*SLIPS} and not claimed:
+                continue
+            other = of_all(lacks - kind)
+            if preferred(means, other, found) > _LIKELIER and _may_be(other):
+                lacks = lacks - kind
+                found, faults = explained(other, lacks)
     return SensorCheck(
         logs=tuple(together),
         faults=faults,
@@ -190,6 +201,22 @@ def checked(
     )
 
 
+def _slipping(readings: Sequence[Readings]) -> list[Readings]:
+    """The readings, those of the longitudinal speed as of wheels that may slip."""
+    along = next((r for r in readings if r.channel == "ax_mps2"), None)
+    if along is None:
+        return list(readings)
+    return [with_slips(r, along) if r.channel == "vx_mps" else r for r in readings]
+
+
+def _may_be(found: Estimate) -> bool:
+    """Whether wheels slip forwards where they are driven: if not, the speed comes late."""
+    return (
+        all(name not in found.faults for name in SLIPS)
+        or sum(found.faults[name] for name in SLIPS) > 0.0
+    )
+
+
 def _names(have: set[str]) -> list[str]:
     """Faults that these channels can show; without both speeds there is little."""
     hidden: set[str] = set()
@@ -199,7 +226,7 @@ def _names(have: set[str]) -> list[str]:
         # for a scale of a_x if it were not estimated.
         hidden |= {"delay.speeds", "arm_x", "turn", "gain.yaw_rate_radps", *SWINGS}
     if "ax_mps2" not in have:
-        hidden |= {"arm_y", "delay.vx_mps", "turn"}
+        hidden |= {"arm_y", "delay.vx_mps", "turn", *SLIPS}
         if "vy_mps" not in have:
             hidden |= {"delay.ay_mps2", "lean.ay_mps2"}  # nothing holds the lateral speed
     return [n for n, kind in FAULTS.items() if kind.channel in have and n not in hidden]

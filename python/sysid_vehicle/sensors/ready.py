@@ -40,7 +40,7 @@ def made_ready(
 
     Biases, scales and places of sensors stay as they are: they are effects of the catalogue, which
     says more of them. Delays of one channel against another are told by kinematics alone, better
-    than by any model with tyres.
+    than by any model with tyres. So is the slip of wheels whose speed is logged.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def made_ready(
     -------
     logs, others : list of Log
     Kinematics
-        A delay that was found is taken out, and settled.
+        A delay that was found is taken out, and settled; slip is taken out.
     """
     ready = conditioned([*logs, *others])
     own, rest = ready[: len(logs)], ready[len(logs) :]
@@ -65,10 +65,12 @@ def made_ready(
         return own, rest, Kinematics()
     left = tuple(fault for fault in found.faults if fault.name not in _DELAYS)
     late = to_put_right([found[name] for name in _DELAYS])
-    if not late:
+    off = late | found.estimate.slips
+    if not off:
         return own, rest, Kinematics((), left)
-    done = [log.corrected(*corrected(log, late), retimed(log, late, found.faults)) for log in ready]
-    return done[: len(logs)], done[len(logs) :], Kinematics(("sensor_delay",), left)
+    done = [log.corrected(*corrected(log, off), retimed(log, late, found.faults)) for log in ready]
+    settles = ("sensor_delay",) if late else ()
+    return done[: len(logs)], done[len(logs) :], Kinematics(settles, left)
 
 
 def _nothing(_: Estimate, faults: Sequence[SensorFault]) -> bool:

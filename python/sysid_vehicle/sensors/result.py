@@ -27,7 +27,7 @@ from .kinematics.estimate import Estimate
 from .kinematics.motion import Stretch
 from .settled import narrowed, settled
 from .signals import MOVING, Signal
-from .texts import ON_CORRECTION, gradient, map_line, swings
+from .texts import ON_CORRECTION, gradient, map_line, slips, swings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -152,18 +152,18 @@ class SensorCheck:
                 axis = channel[:2]
                 values.pop(f"delay_{axis}_s", None)
                 values[f"lean_{axis}_s"] = leaning(self.estimate, self.faults, axis)
-        return values
+        return values | self.estimate.slips
 
     def apply(self, log: Log) -> Log:
         """Return the log with what was found put right, and with what was done recorded.
 
         Low-passes of the sensors and vibration are taken out, and time offsets, biases and scales
-        (gravity by roll and pitch is one); the accelerations are those of the speed sensor's place,
-        in its direction. Where the delay of one speed was found, a like one of the other is put
-        right too. Faults that were not found are left alone; so is the steering angle. Where no
-        wheel force is logged the measured a_x is what drives the car, and its mean beyond the
-        motion is taken out: bias of the sensor and slope of the road are one there. That of a_y is
-        left to the tyres, which can tell them.
+        (gravity by roll and pitch is one), and slip of wheels whose speed is logged; accelerations
+        are those of the speed sensor's place, in its direction. Where the delay of one speed was
+        found, a like one of the other is put right too. Faults that were not found are left alone;
+        so is the steering angle. Where no wheel force is logged the measured a_x is what drives the
+        car, and its mean beyond the motion is taken out: bias of the sensor and slope of the road
+        are one there. That of a_y is left to the tyres, which can tell them.
         """
         if self.conditioning is not None:
             log = self.conditioning.apply(log)
@@ -192,7 +192,7 @@ class SensorCheck:
                     f"gradient of {gradient(fault.value):.3g} deg/g ({low:.3g} to {high:.3g}); "
                     f"kinematics cannot tell it from a scale error{self._leaning(channel)}"
                 )
-        said += swings(self.estimate.faults)
+        said += slips(self.estimate.faults) + swings(self.estimate.faults)
         for signal in self.signals:
             if signal.held_rows:
                 said.append(

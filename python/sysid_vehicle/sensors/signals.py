@@ -188,6 +188,7 @@ def averaged(readings: Readings, over_s: float) -> Readings:
         readings.time_s[at].mean(axis=1),
         readings.values[at].mean(axis=1),
         None if readings.swings is None else readings.swings[at].mean(axis=1),
+        None if readings.slips is None else readings.slips[at].mean(axis=1),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from .kinematics.equations import SWINGS
+from .kinematics.equations import SLIPS, SWINGS
 
 DEG = math.pi / 180.0
 
@@ -50,6 +50,8 @@ _OTHER = {
     "turn": "a turned IMU",
     "swing.slow": "an IMU above the speed sensor, on a body that rolls,",
     "swing.quick": "an IMU above the speed sensor, on a body that rolls,",
+    "slip.driven": "slip of the wheels whose speed is logged",
+    "slip.braked": "slip of the wheels whose speed is logged",
     "lean.ax_mps2": "a body that pitches late",
     "lean.ay_mps2": "a body that rolls late",
 }
@@ -92,6 +94,19 @@ def swings(faults: Mapping[str, float]) -> tuple[str, ...]:
         "look like that, too; the faults are told beside it"
     )
     return (said,) if {*SWINGS} & {*faults} else ()
+
+
+def slips(faults: Mapping[str, float]) -> tuple[str, ...]:
+    """What is said where the wheels slip whose speed is logged."""
+    if not {*SLIPS} <= {*faults}:
+        return ()
+    driven, braked = (100.0 * max(faults[name], 0.0) for name in SLIPS)
+    said = (
+        f"vx_mps: it reads as the speed of wheels that slip by {driven:.2g} % per m/s2 when driven "
+        f"and {braked:.2g} % per m/s2 when braked; the faults are told beside it; a speed over "
+        f"ground, or of wheels that are neither driven nor braked, is free of it"
+    )
+    return (said,)
 
 
 def gradient(gain: float) -> float:

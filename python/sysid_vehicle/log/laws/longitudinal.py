@@ -37,7 +37,7 @@ _DRIVEN_MPS, _LEAST_FORCE_N = 12.0, 30.0  # at that speed drag takes more
 _LIGHTEST_KG, _HEAVIEST_KG = 50.0, 1e5  # of cars that carry a driver
 _HELD_MPS2 = 0.05  # a speed that falls no faster on average is held
 _FRONT_SHARE, _FRONT_SPREAD = 0.5, 0.2  # of the lateral force: what the front axle bears
-_DRAG_PER_M = 0.003  # half the air's density times a large drag area, over the mass of a light car
+DRAG_PER_M = 0.003  # half the air's density times a large drag area, over the mass of a light car
 
 _AX_G = ("ax_mps2", "g", "factor = 9.80665")
 _AX_FEET = ("ax_mps2", "ft/s2", "factor = 0.3048")
@@ -102,7 +102,7 @@ def ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regression
         # The force of the wheels is told before drag, which an accelerometer feels. In few windows
         # drag and acceleration cannot be told apart: the law that explains more counts.
         drag = drive.mean(c["vx_mps"] ** 2)
-        dragged = fit(ramp, [*columns, drag], [*spread, _DRAG_PER_M], [*mean, 0.0])
+        dragged = fit(ramp, [*columns, drag], [*spread, DRAG_PER_M], [*mean, 0.0])
         found = max(found, dragged, key=lambda law: law.coherence)
         ramp = ramp - found.coefficients[len(columns) - 1] * corner
     return ramp, driver, found

@@ -19,6 +19,7 @@ _DEPTH = 8
 YAW = "quaternion_yaw"
 """What the yaw angle of a quaternion is called below it."""
 _HEADERS = ("header", "stamp")  # hold the time, no measurement
+_STAMPS = ("timestamp",)  # of Foxglove's schemas; a number that is called so is a channel
 _SECONDS = ("sec", "secs", "seconds")
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanos")
 _SAME_CLOCK_S = 1.0  # stamps that are farther from the recorder's time are of another clock
@@ -30,6 +31,8 @@ Taken = tuple[str, Any, int, int]  # topic, message, time of the recorder [ns], 
 def numbers(message: Any, depth: int = _DEPTH) -> Iterator[tuple[str, Getter]]:
     """Yield path and getter of each number in a message, such as ``angular_velocity/z``."""
     for name, value, get in _fields(message):
+        if name in _STAMPS and _first_part(value, _SECONDS) is not None:
+            continue
         if isinstance(value, (bool, int, float, np.number, np.bool_)):
             yield name, get
         elif not isinstance(value, (str, bytes, type(None))) and depth > 0:
@@ -118,7 +121,7 @@ def stamp_ns(message: Any) -> int:
     for stamp in (
         _part(_part(message, "header"), "stamp"),
         _part(message, "stamp"),
-        _part(message, "timestamp"),
+        *(_part(message, name) for name in _STAMPS),
     ):
         seconds = _first_part(stamp, _SECONDS)
         if seconds is not None:

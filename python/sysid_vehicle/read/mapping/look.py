@@ -11,7 +11,7 @@ from ...log import CHANNELS, standing
 from ..recording import Recording
 from ..table import Table
 from ..units import factor_to, unit_at_end, unit_in_name
-from .names import rank, si_unit
+from .names import by_axes, rank, si_unit
 
 _RATE_HZ = 50.0  # at which units and signs are looked for
 _FEWEST = 100
@@ -26,10 +26,12 @@ class View:
 
     def __init__(self, held: Table | Recording) -> None:
         self._held = held
+        self._read: dict[str, Signal] = {}
         self.has_times = isinstance(held, Recording)
         self.names = list(held.entries) if isinstance(held, Recording) else list(held.columns)
         if isinstance(held, Table):
             self.names += [n for n in held.seconds if n not in self.names]
+        self.by_axes = by_axes(self.names)
 
     def unit(self, name: str, si_unit: str) -> str:
         """Return the unit that the file states, or the one in brackets behind the name."""
@@ -57,11 +59,22 @@ class View:
         """Whether a column of a table holds dates and times of day."""
         return name in self.stamps
 
+    def moves(self, names: list[str]) -> list[str]:
+        """The names of those that have two values or more."""
+        held = self._held
+        if isinstance(held, Recording):
+            values = {name: x for name, (_, x) in self.values(names, None).items()}
+        else:
+            values = {name: held.columns[name] for name in names if name in held.columns}
+        return [n for n, x in values.items() if np.unique(x[np.isfinite(x)]).size > 1]
+
     def values(self, names: list[str], time: str | None) -> dict[str, Signal]:
         """Return times and values by name; a table's column ``time`` tells its times."""
         if isinstance(self._held, Recording):
-            signals = self._held.signals(names, [])
-            return {name: (s.time_s, s.values) for name, s in signals.items()}
+            # Messages are decoded one by one, which takes most of the time.
+            signals = self._held.signals([n for n in names if n not in self._read], [])
+            self._read.update({name: (s.time_s, s.values) for name, s in signals.items()})
+            return {name: self._read[name] for name in names}
         if time is None:
             return {}
         clock = self._held.seconds.get(time, self._held.columns.get(time))
@@ -71,7 +84,10 @@ class View:
 
 def ranked(view: View, channel: str) -> list[str]:
     """Columns that may be a channel by name and unit, likeliest first."""
-    scored = [(rank(n, view.unit(n, si_unit(channel, n)), channel), n) for n in view.names]
+    scored = [
+        (rank(view.by_axes.get(n, n), view.unit(n, si_unit(channel, n)), channel), n)
+        for n in view.names
+    ]
     kept = [(score, name) for score, name in scored if score > 0.0]
     return [name for _, name in sorted(kept, key=lambda pair: -pair[0])]
 

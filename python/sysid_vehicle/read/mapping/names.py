@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from ..units import FACTORS, plain, states_nothing, unit_at_end, without_unit
 from .ground import PARTS
@@ -30,7 +30,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"twist linear x$|(long\w*|forward) (speed|vel\w*)|(speed|vel\w*) (x|long\w*)$",
         r"(vehicle|ground|corr\w*|gps|car|veh) (speed|vel\w*)|^v (veh|car|ego)|v (fzg|signal)",
         r"^(fzg|fahr(zeug)?) ?geschw\w*|^veh v\b",
-        r"(speed|vel\w*) forward$|\bvel\w* hor x$|^wheel based vehicle speed",
+        r"(speed|vel\w*) forward$|\bvel\w* (body|hor) x$|^wheel based vehicle speed",
         r"^(speed|velocity|vel|geschwindigkeit|v)$",
         r"\b(speed|velocity|geschwindigkeit)\b",
         r"^(vitesse|velocita|velocidade?|snelheid|hastighet)\b|車速|车速|\bsog\b",
@@ -38,7 +38,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
     "vy_mps": (
         r"^[uv] ?y( mps)?$",
         r"twist linear y$|lat\w* (speed|vel\w*)|(speed|vel\w*) (y|lat\w*)$|quergeschw\w*",
-        r"(vitesse|velocita|velocidade?) (lat\w*|trans\w*)",
+        r"\bvel\w* (body|hor) y$|(vitesse|velocita|velocidade?) (lat\w*|trans\w*)",
         _SIDESLIP,
     ),
     "yaw_rate_radps": (
@@ -56,7 +56,8 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"inline acc\w*|laengs ?beschl\w*|langsversnelling|\blon(g|gi)?acc?\b",
         r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
         r"^(imu|ins|body) a ?x$",
-        r"\bacc (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
+        r"\bacc\w* (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
+        r"\bspecific force (x|long\w*)$",
     ),
     "ay_mps2": (
         r"^a ?y( cg)?( mps2)?$|acc ?y$|y acc\w*$",
@@ -64,11 +65,12 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"\blatacc?\b",
         r"^ace?l\w* (lat|trans)\w*|^acc?el\w* trans\w*|dwarsversnelling",
         r"^(imu|ins|body) a ?y$",
-        r"\bacc (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
+        r"\bacc\w* (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
+        r"\bspecific force (y|lat\w*)$",
     ),
     "steer_rad": (
         r"road ?wheel( angle)?$|^steer rad$|front wheel angle",
-        r"steer\w* ?(wheel )?ang\w*|lenk ?(rad ?)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
+        r"ste*r\w* ?((road )?wheel |t[iy]re )?ang\w*|lenk ?(rad ?)?winkel|\bswa\b|hand ?wheel",
         r"\b(steer|steering|steered|delta( ?wheel)?)\b|\b(sas|lws|lwi) (ang\w*|winkel)$",
         r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",
         r"\bservo (cmd |command )?(angle|rad|deg)\b|^servo (cmd|command)$",
@@ -92,20 +94,25 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
 }
 _REFUSED: dict[str, str] = {
     "time_s": r"\b(lap|run|delta|remaining|sector)\b",
-    "vx_mps": r"\bheading rate\b|\b(wheel(?! based)|eng|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*"
-    r"|wind|angular|steer\w*|y|z|trans\w*|lacet|imbardata|guinada|moteur|motore?|roues?|ruot[ae]|rueda|roda|vento?|viento)\b",
+    "vx_mps": r"\bheading rate\b|\b(north|east|up|down)\w* (speed|vel\w*)"
+    r"|\b(wheel(?! based)|eng|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*|wind"
+    r"|angular|steer\w*|y|z|trans\w*|lacet|imbardata|guinada|moteur|motore?|roues?|ruot[ae]|rueda"
+    r"|roda|vento?|viento)\b",
     "vy_mps": r"\b(angular|wind|acc\w*)\b",
     "yaw_rate_radps": r"\b(acc\w*|target|ref\w*|covariance)\b",
     "ax_mps2": r"\b(yaw|lat\w*|vert\w*|angular|covariance|target)\b",
     "ay_mps2": r"\b(yaw|long\w*|vert\w*|angular|covariance|target)\b",
-    "steer_rad": r"\b(torque|rate|speed|vel\w*|moment|target|force|motor|current|rear"
-    r"|counter|cnt|crc|checksum|valid|status)\b",
-    "fx_n": r"\b(fl|fr|rl|rr|brake|steer\w*)\b",
+    "steer_rad": r"\b(torque|rate|speed|vel\w*|moment|target|force|motor|current|rear)\b",
+    "fx_n": r"\b(fl|fr|rl|rr|brake|steer\w*|specific)\b",
     **dict.fromkeys(
         ("east", "north", "heading", "course"),
-        r"\b(std\w*|accuracy|cov\w*|error|sigma|rate|acc\w*|target|ref\w*|wind|valid|status)\b",
+        r"\b(std\w*|accuracy|cov\w*|error|sigma|rate|acc\w*|target|ref\w*|wind)\b",
     ),
 }
+# The last part of the name of what a sensor or a message tells of itself.
+_STATE = r"\b(counter|cnt|crc|checksum|valid|status|enabled?|override|fault|timeout)\b"
+# What a controller or a driver asks for, which stands behind what is measured.
+_WANTED = r"\b(cmd|command(ed)?|desired|requested|setpoint|manual)\b"
 # Names that are those of a channel in its unit alone: a yaw in deg is an angle.
 _IN_ITS_UNIT = {"yaw_rate_radps": r"^(yaw|gyro|psi)$"}
 _SI = {
@@ -120,6 +127,9 @@ _SI = {
     **PARTS,
 }
 
+
+_COLUMN = re.compile(r"(.+)(?:\(:,(\d+)\)|\[(\d+)\])")
+"""Of a matrix, as MATLAB counts them, or of an array."""
 
 _SIGN = {"vz", "vorzeichen", "sign", "sgn"}
 """Words in names of what is not 0 where another signal is negative."""
@@ -151,6 +161,25 @@ def words(name: str) -> str:
     return " ".join(_SHORT.get(word, word) for word in there)
 
 
+def by_axes(names: Sequence[str]) -> dict[str, str]:
+    """Return what the columns of matrices are called by axes: ``imu.gyro(:,3)`` ``imu.gyro z``.
+
+    Of three columns these are x, y and z, of two x and y; others are wheels, quaternions or
+    covariances.
+    """
+    matrices: dict[str, dict[int, str]] = {}
+    for name in names:
+        if found := _COLUMN.fullmatch(name):
+            number = int(found[3]) if found[2] is None else int(found[2]) - 1
+            matrices.setdefault(found[1], {})[number] = name
+    return {
+        name: f"{of} {'xyz'[number]}"
+        for of, columns in matrices.items()
+        if {*columns} in ({0, 1}, {0, 1, 2})
+        for number, name in columns.items()
+    }
+
+
 def rank(name: str, unit: str, channel: str) -> float:
     """Return how well a name and its unit suit a channel: 0 not at all, 1 and more well.
 
@@ -159,7 +188,8 @@ def rank(name: str, unit: str, channel: str) -> float:
     text = words(name)
     if name == channel:
         return 10.0
-    if re.search(_REFUSED[channel], text) or _SIGN & {*text.split()}:
+    last = next(iter(_last_parts(name)[::-1]), text)
+    if re.search(_REFUSED[channel], text) or _SIGN & {*text.split()} or re.search(_STATE, last):
         return 0.0
     patterns = _PATTERNS[channel]
     # As it is, and without a unit at its end: vx_kmh is one of vx.
@@ -175,9 +205,10 @@ def rank(name: str, unit: str, channel: str) -> float:
         ),
         default=0.0,
     )
-    last = words(name.rpartition(".")[2])
-    if score == 0.0 and last != text:  # of a struct, a message or a sensor: after all others
-        score = 0.5 * any(re.search(p, last) for p in patterns)
+    if score == 0.0:  # of a struct, a message or a sensor: after all others
+        score = 0.5 * any(re.search(p, part) for part in _last_parts(name) for p in patterns)
+    elif re.search(_WANTED, text):
+        score -= 0.5
     fits = plain(unit) in FACTORS[si_unit(channel, name)]
     if score == 0.0 and fits and channel in _IN_ITS_UNIT:
         score = float(re.search(_IN_ITS_UNIT[channel], forms[2]) is not None)
@@ -185,6 +216,12 @@ def rank(name: str, unit: str, channel: str) -> float:
         return score
     known = any(plain(unit) in factors for factors in FACTORS.values())
     return score + 2.0 if fits else 0.0 if known else score
+
+
+def _last_parts(name: str) -> list[str]:
+    """In plain words, what stands behind each point and slash of a name, units left out."""
+    bare = re.sub(r"\s*(\[[^\]]*\]|\([^)]*\))$", "", name)
+    return [words(bare[found.end() :]) for found in re.finditer(r"[./]", bare)]
 
 
 def si_unit(channel: str, name: str) -> str:

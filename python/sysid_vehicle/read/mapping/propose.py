@@ -106,7 +106,7 @@ def propose_channels(
         axles = ("rear", "front")
         if vehicle is not None and vehicle.drive_front_share < 0.5:
             axles = ("front", "rear")
-        guess = _Guess(view, chosen, axles)
+        guess = _Guess(view, _moving_first(view, chosen), axles)
         return guess.proposal(None if vehicle is None else vehicle.wheelbase_m)
 
 
@@ -123,17 +123,36 @@ def _factor(time: FloatArray) -> float:
     return next(factor for below, factor in _FINER if step < below)
 
 
+def _first(chosen: Mapping[str, list[str]]) -> dict[str, str]:
+    """The likeliest column of each channel; a column is that of the first channel in the list."""
+    first: dict[str, str] = {}
+    for channel, names in chosen.items():
+        free = [name for name in names if name not in first.values()]
+        if free:
+            first[channel] = free[0]
+    return first
+
+
+def _moving_first(view: View, chosen: Mapping[str, list[str]]) -> dict[str, list[str]]:
+    """Put columns of one number behind those that move: buses have fields that nothing fills."""
+    still: set[str] = set()
+    seen: set[str] = set()
+    while True:
+        by_life = {c: sorted(names, key=still.__contains__) for c, names in chosen.items()}
+        likeliest = _first({c: names for c, names in by_life.items() if len(names) > 1})
+        asked = [n for c, n in likeliest.items() if c != "time_s" and n not in seen]
+        if not asked:
+            return by_life
+        seen.update(asked)
+        still.update({*asked} - {*view.moves(asked)})
+
+
 class _Guess:
     """What the columns are taken for, step by step."""
 
     def __init__(self, view: View, chosen: Mapping[str, list[str]], axles: tuple[str, ...]) -> None:
         self.view, self.chosen = view, chosen
-        # A column is one channel: the one that is first in the list of channels.
-        self.first: dict[str, str] = {}
-        for channel, names in chosen.items():
-            free = [name for name in names if name not in self.first.values()]
-            if free:
-                self.first[channel] = free[0]
+        self.first = _first(chosen)
         self.parts = self._over_ground()
         self.factors: dict[str, float] = {}
         self.why: dict[str, list[str]] = {}

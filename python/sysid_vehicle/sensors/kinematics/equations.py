@@ -60,6 +60,12 @@ SWING_STD_S2 = 0.5 * math.radians(4.0) / GRAVITY_MPS2
 SWINGS = {"swing.slow": 1.2, "swing.quick": 2.2}
 """Faults by a body that swings, with natural frequencies that are spread as those of cars [Hz]."""
 
+# Standard deviation of the slip of wheels per acceleration [s2/m]: a car's mass over the slip
+# stiffness of the tyres of an axle.
+SLIP_STD_S2PM = 0.01
+SLIPS = ("slip.driven", "slip.braked")
+"""Faults by wheels whose speed is logged and that slip."""
+
 FAULTS = {
     kind.name: kind
     for kind in (
@@ -80,6 +86,7 @@ FAULTS = {
         FaultKind("lean.ay_mps2", "ay_mps2", 1e3, LEAN_STD_S),
         # The body rolls as an oscillator, and an IMU above the speed sensor swings with it.
         *(FaultKind(name, "ay_mps2", 1e3, SWING_STD_S2) for name in SWINGS),
+        *(FaultKind(name, "vx_mps", 1e3, SLIP_STD_S2PM) for name in SLIPS),
     )
 }
 _SPEEDS = ("vx_mps", "vy_mps")  # of one device as a rule
@@ -109,6 +116,8 @@ class Readings:
     swings : ndarray, shape (n, len(SWINGS)), optional
         Second derivatives of what should have been written [m/s4], as a body follows it that
         swings, of an axis that feels them (`swing.py`).
+    slips : ndarray, shape (n, len(SLIPS)), optional
+        What the slip of wheels grows with [m/s2] (`slip.py`).
     """
 
     channel: str
@@ -116,6 +125,7 @@ class Readings:
     time_s: FloatArray
     values: FloatArray
     swings: FloatArray | None = None
+    slips: FloatArray | None = None
 
 
 def predict(
@@ -191,13 +201,20 @@ def _read(
     else:
         columns = places.at[_NEEDS[name][0]]
         value, rate = _evaluate(x, columns, quick)[:2]
-        gain = 1.0 + faults.get(f"gain.{name}", 0.0)
+        gain, weights = 1.0 + faults.get(f"gain.{name}", 0.0), quick.weights[0]
+        by_fault = {f"gain.{name}": value, f"bias.{name}": np.ones_like(value)}
+        if readings.slips is not None:
+            by_fault |= {
+                kind: gain * value * slip
+                for kind, slip in zip(SLIPS, readings.slips.T, strict=True)
+            }
+            slipped = 1.0 + readings.slips @ np.array([faults.get(kind, 0.0) for kind in SLIPS])
+            value, weights = value * slipped, slipped[:, None] * weights
         expected = gain * value + faults.get(f"bias.{name}", 0.0)
 
         def blocks() -> list[tuple[IntArray, FloatArray]]:
-            return [(columns, gain * quick.weights[0])]
+            return [(columns, gain * weights)]
 
-        by_fault = {f"gain.{name}": value, f"bias.{name}": np.ones_like(value)}
     by_fault[f"delay.{name}"] = -rate
     if share:
         by_fault[f"lean.{name}"] = -share * rate

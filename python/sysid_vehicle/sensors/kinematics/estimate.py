@@ -24,7 +24,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import check_time
 from .colour import Colour, fit_colour, neighbours
 from .covariance import covariance_of, inflated
-from .equations import FAULTS, Readings, predict
+from .equations import FAULTS, SLIPS, Readings, predict
 from .motion import QUICK, SLOW, Grid
 from .one_sided import OneSided
 from .road import Unevenness
@@ -93,6 +93,11 @@ class Estimate:
     settled: bool
     factor: FloatArray
     across: FloatArray
+
+    @property
+    def slips(self) -> dict[str, float]:
+        """Slip per acceleration of wheels whose speed is logged [s2/m]; empty where none is."""
+        return {name: x for name, x in self.faults.items() if name in SLIPS}
 
     def draw(
         self, count: int, seed: int | np.random.Generator = 0

@@ -15,7 +15,7 @@ from .motion import Stretch
 
 _DAMPING = 0.3  # of a body's roll; of cars 0.2 to 0.4
 _SMOOTH_HZ = 4.0  # quicker than this no body rolls
-_RATE_HZ = 100.0  # at which the oscillators run
+RATE_HZ = 100.0  # at which the oscillators run
 
 
 def with_swings(readings: Readings, found: Estimate) -> Readings:
@@ -38,8 +38,8 @@ def with_swings(readings: Readings, found: Estimate) -> Readings:
     for stretch in np.unique(readings.stretch):
         own = np.flatnonzero(readings.stretch == stretch)
         time_s = readings.time_s[own]
-        even = np.arange(time_s[0], time_s[-1] + 1.0 / _RATE_HZ, 1.0 / _RATE_HZ)
-        pushed = _smooth(np.interp(even, time_s, push[own]))
+        even = np.arange(time_s[0], time_s[-1] + 1.0 / RATE_HZ, 1.0 / RATE_HZ)
+        pushed = smooth(np.interp(even, time_s, push[own]))
         for i, natural_hz in enumerate(SWINGS.values()):
             swings[own, i] = np.interp(time_s, even, _swing(pushed, natural_hz))
     return replace(readings, swings=as_float64(swings))
@@ -69,8 +69,9 @@ def swings_as(
     return replace(part, swings=as_float64(swings))
 
 
-def _smooth(values: FloatArray) -> FloatArray:
-    low = scipy.signal.butter(2, _SMOOTH_HZ, fs=_RATE_HZ, output="sos")
+def smooth(values: FloatArray) -> FloatArray:
+    """Values at `RATE_HZ` without what is quicker than a body moves."""
+    low = scipy.signal.butter(2, _SMOOTH_HZ, fs=RATE_HZ, output="sos")
     if values.size <= 3 * 2 * (low.shape[0] + 1):
         return values
     return as_float64(scipy.signal.sosfiltfilt(low, values))
@@ -79,5 +80,5 @@ def _smooth(values: FloatArray) -> FloatArray:
 def _swing(pushed: FloatArray, natural_hz: float) -> FloatArray:
     """Second derivative of what follows as an oscillator, from rest where it is pushed at first."""
     w = 2.0 * np.pi * natural_hz
-    b, a = scipy.signal.bilinear([w**2, 0.0, 0.0], [1.0, 2.0 * _DAMPING * w, w**2], fs=_RATE_HZ)
+    b, a = scipy.signal.bilinear([w**2, 0.0, 0.0], [1.0, 2.0 * _DAMPING * w, w**2], fs=RATE_HZ)
     return as_float64(scipy.signal.lfilter(b, a, pushed - pushed[0]))

@@ -1,0 +1,48 @@
+"""A speed of wheels that slip as they drive and brake: none comes too early."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+
+DRIVEN, BRAKED = 0.010, 0.004  # s2/m, those of rear wheels that drive alone and brake a little
+
+
+def wheels(seed: int, driven: float, braked: float, *, late_s: float = 0.0) -> sv.Log:
+    truth = sv.Model(sv.example_vehicle())
+    log = sv.drive(truth, sv.manoeuvres.lap(16.0, 7.0), seed=seed, rate_hz=50.0)
+    force = log["fx_n"] / truth.vehicle.mass_kg
+    slip = driven * np.maximum(force, 0.0) + braked * np.minimum(force, 0.0)
+    speeds = {"vx_mps": log["vx_mps"] * (1.0 + slip), "vy_mps": log["vy_mps"]}
+    if late_s:
+        t = log["time_s"]
+        speeds = {c: np.interp(t - late_s, t, x) for c, x in speeds.items()}
+    return log.corrected(speeds, []).without("fx_n").without("vy_mps")
+
+
+@pytest.mark.parametrize("seed", [423569, 251247])
+def test_a_speed_of_wheels_is_not_early(seed: int) -> None:
+    log = wheels(seed, DRIVEN, BRAKED)
+    check = sv.check(log, sv.example_vehicle())
+    assert "delay_vx_s" not in {fault.name for fault in check.found}
+    assert "speed of wheels that slip by" in str(check)
+    clean = sv.drive(
+        sv.Model(sv.example_vehicle()),
+        sv.manoeuvres.lap(16.0, 7.0),
+        seed=seed,
+        rate_hz=50.0,
+        noise=sv.SensorNoise.none(),
+    )["vx_mps"]
+    before, after = (float(np.std(x["vx_mps"] - clean)) for x in (log, check.apply(log)))
+    assert after < 0.25 * before
+
+
+@pytest.mark.parametrize("late_s", [0.1, -0.1])
+def test_a_speed_that_comes_late_or_early_is(late_s: float) -> None:
+    """Slip explains speeds that come early, in proportion to them, and no others."""
+    found = sv.check(wheels(115761, 0.0, 0.0, late_s=late_s), sv.example_vehicle())
+    assert found["delay_vx_s"].found
+    assert found["delay_vx_s"].value == pytest.approx(late_s, abs=0.015)
+    assert "slip" not in " ".join(found.remarks)
