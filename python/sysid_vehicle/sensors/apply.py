@@ -43,8 +43,8 @@ def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArra
     if any(name in found for name in SLIPS) and log.has("ax_mps2"):
         known = np.isfinite(log["ax_mps2"])
         felt = smoothed(log["time_s"][known], log["ax_mps2"][known], log["time_s"])
-        size = np.array([found.get(name, 0.0) for name in SLIPS])
-        now["vx_mps"] = values("vx_mps") / (1.0 + slips_of(felt) @ size)
+        size, speed = np.array([found.get(name, 0.0) for name in SLIPS]), values("vx_mps")
+        now["vx_mps"] = speed / (1.0 + slips_of(felt, speed) @ size)
         what.append("vx_mps: slip of the wheels taken out")
     for channel, names in LATE.items():
         late_s = sum(found.get(name, 0.0) for name in names)

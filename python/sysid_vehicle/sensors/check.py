@@ -179,7 +179,7 @@ def checked(
 
     faults = told_of(found)
     if not enough(found, faults):
-        claimed = any(fault.found for fault in faults)
+        claimed = {fault.name for fault in faults if fault.found}
         found, faults = explained(found, lacks)
         for kind in others:
             # A speed of wheels is only asked for where something is off: most cars have one.
@@ -187,8 +187,11 @@ def checked(
                 continue
             other = of_all(lacks - kind)
             if preferred(means, other, found) > _LIKELIER and _may_be(other):
-                lacks = lacks - kind
-                found, faults = explained(other, lacks)
+                instead, left = explained(other, lacks - kind)
+                # Wheels that slip take the place of faults, and bring none.
+                if kind <= {*SLIPS} and not claimed.issuperset(f.name for f in left if f.found):
+                    continue
+                lacks, found, faults = lacks - kind, instead, left
     return SensorCheck(
         logs=tuple(together),
         faults=faults,
