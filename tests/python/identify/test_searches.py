@@ -1,9 +1,13 @@
 """Local searches: the damping of their steps, and which of their ends are followed."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from sysid_vehicle.identify.search.objective import Objective
 from sysid_vehicle.identify.search.search import Box, _eased, minimise
+from sysid_vehicle.identify.search.settle import risen
 from sysid_vehicle.identify.search.starts import apart
 
 
@@ -80,3 +84,23 @@ def test_steps_that_promise_next_to_nothing_are_not_tried() -> None:
     much = Copying((0.1, 3.0))
     found = minimise(much, np.zeros(2), None, box, tolerance=0.1)  # type: ignore[arg-type]
     assert found.x == pytest.approx([15.0, -15.0], abs=0.1)
+
+
+def test_a_climb_ends_inside_the_box() -> None:
+    """From some places to the bound and back adds up to more than the bound."""
+
+    class Rising:
+        samples = 1
+
+        def freeze(self, p: np.ndarray, _: object) -> SimpleNamespace:
+            return SimpleNamespace(log_likelihood=float(p[0]))
+
+    box, noise = Box([0], np.array([-6.0]), np.ones(1)), np.empty(0)
+    objective = Objective(Rising())  # type: ignore[arg-type]
+    begun = -6.0 + 7.0 * np.arange(1, 400) / 400.0
+    assert (begun + (1.0 - begun) > 1.0).any()
+    for begin in begun:
+        p = np.array([begin])
+        reached, _ = risen(objective, p, objective.freeze(p, noise), np.ones(1), noise, box)
+        assert reached[0] == pytest.approx(1.0)
+        assert reached[0] <= 1.0

@@ -384,23 +384,3 @@ def test_parameters_move_only_where_the_likelihood_rises() -> None:
     assert list(reached) == [7.0, 0.25]
     assert there.log_likelihood > begin.log_likelihood
     assert risen(objective, reached, there, np.array([0.8]), noise, box) == (reached, there)
-
-
-def test_a_climb_ends_inside_the_box() -> None:
-    """From some places to the bound and back adds up to more than the bound."""
-
-    class Rising:
-        samples = 1
-
-        def freeze(self, p: np.ndarray, _: object) -> SimpleNamespace:
-            return SimpleNamespace(log_likelihood=float(p[0]))
-
-    box, noise = Box([0], np.array([-6.0]), np.ones(1)), np.empty(0)
-    objective = Objective(Rising())  # type: ignore[arg-type]
-    begun = -6.0 + 7.0 * np.arange(1, 400) / 400.0
-    assert (begun + (1.0 - begun) > 1.0).any()
-    for begin in begun:
-        p = np.array([begin])
-        reached, _ = risen(objective, p, objective.freeze(p, noise), np.ones(1), noise, box)
-        assert reached[0] == pytest.approx(1.0)
-        assert reached[0] <= 1.0
