@@ -125,6 +125,18 @@ class TestLags:
         # The steering depends on tyres that are not known, and so does its time.
         assert float(found[1]) == pytest.approx(0.1, abs=0.03 if channel == "steer_rad" else 0.01)
 
+    @pytest.mark.parametrize("early_s", [0.1, -0.1])
+    def test_of_a_speed_that_comes_early_slip_is_the_rival(
+        self, truth: Model, early_s: float
+    ) -> None:
+        data = columns_of(drive(truth, manoeuvres.double_lane_change(), seed=9))
+        time_s, vx = data["time_s"], data["vx_mps"]
+        said = heard({**data, "vx_mps": np.interp(time_s + early_s, time_s, vx)})
+        found = re.search(r"slip of ([\d.]+) % per m/s2 does the same", said)
+        assert (found is not None) is (early_s > 0.0), said
+        if found is not None:
+            assert float(found[1]) == pytest.approx(100.0 * early_s / np.median(vx), rel=0.3)
+
     def test_the_remedy_mends_it(self, truth: Model) -> None:
         data = columns_of(drive(truth, manoeuvres.step_steer(), seed=9))
         time_s, yaw = data["time_s"], data["yaw_rate_radps"]

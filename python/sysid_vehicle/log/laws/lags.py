@@ -22,6 +22,7 @@ _USUAL_S = 0.055
 _LEVER_M = 1.2
 _STEER_LATE_S = 0.03
 _STEER_EARLY_S = 0.12  # hydraulics, rubber and relaxing tyres delay the answer of a car
+_MOST_SLIP_S2PM = 0.03  # of wheels, per acceleration
 _FORCE_EARLY_S = 0.4  # brakes and engines take their time
 # Of acceleration, squared speed, lateral acceleration times steering, and one; per mass.
 _FORCE_PRIOR = np.array([1.0, 3e-4, 0.5, 0.0])
@@ -175,7 +176,15 @@ def _speed(m: Motion, usable: np.ndarray) -> list[Contradiction]:
         return m.change(c["vx_mps"]), np.column_stack(columns)
 
     lag = find_lag(sides, np.array([*mean, 0.0, 0.0]), np.array([*spread, 0.5, np.inf]), usable)
-    return [_note("vx_mps", "ax_mps2", lag)] if _told(lag, _USUAL_S, _USUAL_S) else []
+    if not _told(lag, _USUAL_S, _USUAL_S):
+        return []
+    # The speed of wheels is v (1 + s a): to first order a speed that comes early by s v.
+    slip = -lag.seconds / float(np.median(m.mean(c["vx_mps"])[usable]))
+    rival = (
+        f"; slip of {100.0 * slip:.1g} % per m/s2 does the same where this is the speed of driven "
+        "or braked wheels, and then no clock is wrong: the check of the sensors tells them apart"
+    )
+    return [_note("vx_mps", "ax_mps2", lag, rival if 0.0 < slip < _MOST_SLIP_S2PM else "")]
 
 
 def sideways(m: Motion) -> list[FloatArray]:
@@ -227,12 +236,12 @@ def _enough(lag: Lag, least: float) -> bool:
     return lag.gain > least and lag.evidence > _MIN_EVIDENCE
 
 
-def _note(name: str, other: str, lag: Lag) -> Contradiction:
+def _note(name: str, other: str, lag: Lag, rival: str = "") -> Contradiction:
     verb = "lags behind" if lag.seconds > 0.0 else "runs ahead of"
     deviation = max(2.0 * lag.deviation, 0.001)
     text = (
         f"{name}: {verb} {other} by {abs(lag.seconds):.2g} s (+- {deviation:.1g}) over the whole "
         f"log; a shift in time looks like a lag of the car: put delay_s = {lag.seconds:.2g} for "
-        f"{name} in the channel map, or set the clocks right"
+        f"{name} in the channel map, or set the clocks right{rival}"
     )
     return Contradiction(name, text, lag.seconds)
