@@ -22,11 +22,13 @@ def wheels(seed: int, driven: float, braked: float, *, late_s: float = 0.0) -> s
     return log.corrected(speeds, []).without("fx_n").without("vy_mps")
 
 
-@pytest.mark.parametrize("seed", [423569, 251247])
+@pytest.mark.parametrize("seed", [423569, 251247, 890200])
 def test_a_speed_of_wheels_is_not_early(seed: int) -> None:
     log = wheels(seed, DRIVEN, BRAKED)
     check = sv.check(log, sv.example_vehicle())
-    assert "delay_vx_s" not in {fault.name for fault in check.found}
+    assert not check.found
+    # Drag is a part of the force: without it the wheels seem to slip more as they brake.
+    assert [*check.estimate.slips.values()] == pytest.approx([DRIVEN, BRAKED], rel=0.1)
     assert "speed of wheels that slip by" in str(check)
     clean = sv.drive(
         sv.Model(sv.example_vehicle()),

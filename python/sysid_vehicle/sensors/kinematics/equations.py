@@ -202,14 +202,13 @@ def _read(
         columns = places.at[_NEEDS[name][0]]
         value, rate = _evaluate(x, columns, quick)[:2]
         gain, weights = 1.0 + faults.get(f"gain.{name}", 0.0), quick.weights[0]
-        by_fault = {f"gain.{name}": value, f"bias.{name}": np.ones_like(value)}
+        by_fault = {f"bias.{name}": np.ones_like(value)}
         if readings.slips is not None:
-            by_fault |= {
-                kind: gain * value * slip
-                for kind, slip in zip(SLIPS, readings.slips.T, strict=True)
-            }
+            for kind, slip in zip(SLIPS, readings.slips.T, strict=True):
+                by_fault[kind] = gain * value * slip
             slipped = 1.0 + readings.slips @ np.array([faults.get(kind, 0.0) for kind in SLIPS])
             value, weights = value * slipped, slipped[:, None] * weights
+        by_fault[f"gain.{name}"] = value
         expected = gain * value + faults.get(f"bias.{name}", 0.0)
 
         def blocks() -> list[tuple[IntArray, FloatArray]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
 from .equations import SLIPS, Readings
-from .swing import RATE_HZ, smooth
+from .swing import smooth
 
 # Half the air's density times the drag area, over the mass: of cars 2e-4 to 4e-4.
 _DRAG_PER_M = 3e-4
@@ -44,5 +44,4 @@ def slips_of(along_mps2: FloatArray, speed_mps: FloatArray) -> FloatArray:
 
 def smoothed(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
     """A channel without its noise at other times."""
-    even = np.arange(time_s[0], time_s[-1] + 1.0 / RATE_HZ, 1.0 / RATE_HZ)
-    return as_float64(np.interp(at_s, even, smooth(np.interp(even, time_s, values))))
+    return as_float64(np.interp(at_s, *smooth(time_s, values)))

@@ -15,7 +15,7 @@ from .motion import Stretch
 
 _DAMPING = 0.3  # of a body's roll; of cars 0.2 to 0.4
 _SMOOTH_HZ = 4.0  # quicker than this no body rolls
-RATE_HZ = 100.0  # at which the oscillators run
+_RATE_HZ = 100.0  # at which the oscillators run
 
 
 def with_swings(readings: Readings, found: Estimate) -> Readings:
@@ -38,8 +38,7 @@ def with_swings(readings: Readings, found: Estimate) -> Readings:
     for stretch in np.unique(readings.stretch):
         own = np.flatnonzero(readings.stretch == stretch)
         time_s = readings.time_s[own]
-        even = np.arange(time_s[0], time_s[-1] + 1.0 / RATE_HZ, 1.0 / RATE_HZ)
-        pushed = smooth(np.interp(even, time_s, push[own]))
+        even, pushed = smooth(time_s, push[own])
         for i, natural_hz in enumerate(SWINGS.values()):
             swings[own, i] = np.interp(time_s, even, _swing(pushed, natural_hz))
     return replace(readings, swings=as_float64(swings))
@@ -69,16 +68,18 @@ def swings_as(
     return replace(part, swings=as_float64(swings))
 
 
-def smooth(values: FloatArray) -> FloatArray:
-    """Values at `RATE_HZ` without what is quicker than a body moves."""
-    low = scipy.signal.butter(2, _SMOOTH_HZ, fs=RATE_HZ, output="sos")
-    if values.size <= 3 * 2 * (low.shape[0] + 1):
-        return values
-    return as_float64(scipy.signal.sosfiltfilt(low, values))
+def smooth(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Even times, and the values there without what is quicker than a body moves."""
+    even = np.arange(time_s[0], time_s[-1] + 1.0 / _RATE_HZ, 1.0 / _RATE_HZ)
+    values = np.interp(even, time_s, values)
+    low = scipy.signal.butter(2, _SMOOTH_HZ, fs=_RATE_HZ, output="sos")
+    if values.size > 3 * 2 * (low.shape[0] + 1):
+        values = scipy.signal.sosfiltfilt(low, values)
+    return as_float64(even), as_float64(values)
 
 
 def _swing(pushed: FloatArray, natural_hz: float) -> FloatArray:
     """Second derivative of what follows as an oscillator, from rest where it is pushed at first."""
     w = 2.0 * np.pi * natural_hz
-    b, a = scipy.signal.bilinear([w**2, 0.0, 0.0], [1.0, 2.0 * _DAMPING * w, w**2], fs=RATE_HZ)
+    b, a = scipy.signal.bilinear([w**2, 0.0, 0.0], [1.0, 2.0 * _DAMPING * w, w**2], fs=_RATE_HZ)
     return as_float64(scipy.signal.lfilter(b, a, pushed - pushed[0]))
