@@ -109,3 +109,22 @@ def test_a_change_that_gained_nothing_keeps_its_line(
     sizes, stds = {name: 0.001}, {name: 1e-9}
     offset._by_ratio(OFFSET, sizes, stds)
     assert (sizes[name], stds[name]) == (0.001, 0.001)
+
+
+def test_a_size_beside_what_acts_like_it_is_as_uncertain_as_both(
+    truth: Model, before: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = {"steer_delay": 0.03, "steer_lag": 0.03}  # [s]
+    log = later(truth, steer_delay__delay_s=0.03, steer_lag__time_constant_s=0.03)
+    said = searched(before, log, *late)
+    said.search._visit(tuple(late), said.told)
+    both = visited(said, *late)
+    monkeypatch.setattr(said, "state", both)
+    monkeypatch.setattr(said, "told", said.search.told(both))
+    sizes, stds = said._told_sizes([], both)
+    for name, size in both.changes.items():
+        alone = said.told.stds[name]
+        assert sizes[name] == size
+        # Their sum is known to a millisecond or two, what either is of it is not.
+        assert stds[name] > 5.0 * alone
+        assert abs(size - late[name.split(".")[0]]) < 2.0 * stds[name]

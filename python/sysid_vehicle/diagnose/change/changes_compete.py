@@ -50,6 +50,8 @@ class Competition:
     put : tuple of str
     sizes, stds : dict of str to float
         By parameter: the change beside what was put in, in place of what acts like it.
+    stds_beside : dict of str to float
+        The same beside all that was put in.
     causes : Causes
     alone : tuple of str
         What may have changed by itself, the likeliest first.
@@ -79,6 +81,7 @@ class Competition:
         self._alike = self._likeness()
         self.sizes: dict[str, float] = {}
         self.stds: dict[str, float] = {}
+        self.stds_beside: dict[str, float] = {}
         self._ratio = self._measured()
         self.causes, self.alone = self._posterior()
 
@@ -154,7 +157,7 @@ class Competition:
         in and the one in question together.
         """
         n = len(self._score)
-        along, sizes, mine = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 2))
+        along, sizes, mine = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 3))
         told = np.eye(n)
         for name, h in self._whole.items():
             own = list(h.columns)
@@ -164,9 +167,12 @@ class Competition:
             for c in own:
                 i = both.index(c)
                 along[both, c] = inverse[:, i]
-                mine[c] = size[i], np.sqrt(max(inverse[i, i], 0.0))
+                mine[c, :2] = size[i], np.sqrt(max(inverse[i, i], 0.0))
             every, inverse = self._solved([*self.put, name])
             sizes[np.ix_(every, own)] = (inverse @ self._score[every])[:, None]
+            for c in own:
+                i = every.index(c)
+                mine[c, 2] = np.sqrt(max(inverse[i, i], mine[c, 1] ** 2))
             if name.startswith(UNKNOWN):
                 # One score: along all that it explains.
                 along[:, own] = 0.0
@@ -182,7 +188,8 @@ class Competition:
                 self.sizes[name] = float(mine[c, 0])
                 # What no driving tells of it, as nothing that it acts on is measured.
                 known = mine[c, 1] > 0.0
-                self.stds[name] = float(mine[c, 1] * np.sqrt(wide[c])) if known else np.inf
+                own_std, beside_std = mine[c, 1:] * np.sqrt(wide[c]) if known else (np.inf, np.inf)
+                self.stds[name], self.stds_beside[name] = float(own_std), float(beside_std)
         ratio = ratios[n:]
         for name, h in self._whole.items():
             own = list(h.columns)

@@ -72,20 +72,22 @@ class Saying:
     ) -> tuple[dict[str, float], dict[str, float]]:
         """Sizes and standard errors by parameter: exact ones where there are, lines elsewhere."""
         told, state = self.told, self.state
-        sizes, stds = (self._of_the_car(told_by, state) for told_by in (told.sizes, told.stds))
-        # Of what was put in the exact size: no line is drawn from the reference to there.
+        lines = (told.sizes, told.stds, told.stds_beside)
+        sizes, stds, beside = (self._of_the_car(told_by, state) for told_by in lines)
+        # Of what was put in the exact size: no line is drawn from the reference to there. It was
+        # fitted together with all else that was put in, what acts like it too.
         for e in state.put:
             sizes |= self._sizes_in(state, e)
+            stds |= {n: beside[n] for n in self.search.can[e].names}
         for e in self.search.can:
             self._by_ratio(e, sizes, stds)
         for s in shown:
             for e in s.effects:
                 other = self._in_place(e, s, state) or self._in_place(e, s, named)
                 if other is not None and e not in state.put:
-                    beside = self.search.told(other)
                     sizes |= self._sizes_in(other, e)
-                    lines = self._of_the_car(beside.stds, other)
-                    stds |= {n: max(lines[n], stds[n]) for n in self.search.can[e].names}
+                    own = self._of_the_car(self.search.told(other).stds_beside, other)
+                    stds |= {n: max(own[n], stds[n]) for n in self.search.can[e].names}
         return sizes, stds
 
     def _by_ratio(self, effect: str, sizes: dict[str, float], stds: dict[str, float]) -> None:
