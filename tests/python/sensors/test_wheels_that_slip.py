@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
 import sysid_vehicle as sv
+from sysid_vehicle.sensors.faults import SensorFault
+from sysid_vehicle.sensors.kinematics.estimate import Estimate
 
 DRIVEN, BRAKED = 0.010, 0.004  # s2/m, those of rear wheels that drive alone and brake a little
 
@@ -48,3 +55,18 @@ def test_a_speed_that_comes_late_or_early_is(late_s: float) -> None:
     assert found["delay_vx_s"].found
     assert found["delay_vx_s"].value == pytest.approx(late_s, abs=0.015)
     assert "slip" not in " ".join(found.remarks)
+
+
+def test_slip_that_brings_another_fault_takes_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = importlib.import_module("sysid_vehicle.sensors.check")
+    told: Callable[..., tuple[SensorFault, ...]] = module.faults_of
+
+    def with_another(found: Estimate, *rest: Any, **more: Any) -> tuple[SensorFault, ...]:
+        faults = told(found, *rest, **more)
+        brings = "imu_left_m" if found.slips else ""
+        return tuple(replace(f, found=f.found or f.name == brings) for f in faults)
+
+    monkeypatch.setattr(module, "faults_of", with_another)
+    check = sv.check(wheels(423569, DRIVEN, BRAKED), sv.example_vehicle())
+    assert not check.estimate.slips
+    assert not check["imu_left_m"].found
