@@ -18,7 +18,7 @@ from ..errors import warn
 from ..identify import Fit, identify
 from ..model import Model
 from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
-from ..study import Study, improve, left_out
+from ..study import Study, events, improve, left_out
 from ..vehicle import Vehicle
 from . import changed, fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import read_logs, say_it_runs, written_map
@@ -72,7 +72,7 @@ def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
     print(text_table(RANKING_HEAD, rows))
     print()
     print(" ".join(summary(study)))
-    print(study.in_the_end)
+    print(*events(study), study.in_the_end, sep="\n")
     print()
     _print_where(study)
     if study.unknown is not None:
@@ -207,4 +207,5 @@ def _comparison(c: Comparison, fit: Fit) -> dict[str, Any]:
         ],
         "parameters": {e.name: e.to_dict() for e in (*fit.estimates, *fit.derived)},
         "unrelated": c.unrelated,
+        "event": None if c.event is None else c.event.to_dict(),
     }

@@ -14,9 +14,11 @@ from .._common.tables import dataset, frame
 from .._common.text import brief, html_list, html_paragraph, html_table, number, text_table
 from .._common.typed import typed
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
+from ..estimate.noise import TIMES, noise_range
 from ..estimate.pieces import traces
 from ..identify import Fit, driving_beside, driving_of, explaining
 from ..log import Log
+from .event import Event
 from .failure_map import FailureMap, Region
 from .unrelated import incoherent, unrelated
 
@@ -70,6 +72,8 @@ class Comparison:
         Of the driving under the model and the noise it was fitted with.
     unrelated : dict of str to str
         Channels that contradict the others, which no effect of a car explains, and how.
+    event : Event or None
+        A moment that holds most of the error, as something outside the model happened there.
     """
 
     title: str
@@ -82,6 +86,7 @@ class Comparison:
     residual: FloatArray
     log_likelihood: float
     unrelated: dict[str, str] = field(default_factory=dict)
+    event: Event | None = None
 
     _HEAD = ("channel", "rmse", "noise floor", "rmse / floor", "R2", "unit")
 
@@ -94,11 +99,15 @@ class Comparison:
     def _headline(self) -> str:
         return f"{self.title}: error {self.error:.3f} of the noise floor, one step ahead"
 
+    def _events(self) -> tuple[Event, ...]:
+        return () if self.event is None else (self.event,)
+
     __repr__ = brief
 
     def __str__(self) -> str:
         parts = [self._headline(), text_table(self._HEAD, self._rows())]
         parts += [f"Something else is wrong: {text}" for text in self.unrelated.values()]
+        parts += [str(event) for event in self._events()]
         if self.regions:
             parts.append("Where it fails most")
             parts += [f"  {r}" for r in self.regions]
@@ -108,7 +117,7 @@ class Comparison:
         return (
             html_paragraph(self._headline())
             + html_table(self._HEAD, self._rows())
-            + html_list([*self.unrelated.values(), *self.regions])
+            + html_list([*self.unrelated.values(), *self._events(), *self.regions])
         )
 
     def to_pandas(self) -> Any:
@@ -242,6 +251,7 @@ def compare(
             float(1.0 - np.mean(e**2) / variance) if variance > 0 else float("nan"),
         )
     failures = FailureMap.of(driving, squares, count)
+    longest_s = float(noise_range(fit.model.vehicle)[1][TIMES].max())
     innovation /= spread  # long driving has no room for both
     title = f"{', '.join(fit.model.effects) or 'baseline'} on {driving}"
     return Comparison(
@@ -255,4 +265,5 @@ def compare(
         innovation,
         log_likelihood,
         wrong,
+        Event.of_driving(driving, squares, count, longest_s),
     )

@@ -1,7 +1,7 @@
 """Driving logs: canonical channels on a uniform grid, checked before they are used."""
 
 from .against_car import check_car, times_wheelbase
-from .build import LEAST_USABLE_S
+from .build import LEAST_STRETCH_S, LEAST_USABLE_S
 from .channels import CHANNELS, MEASURED, Channel
 from .columns import Columns, as_floats, listed, named_columns
 from .held import held_rows
@@ -14,6 +14,7 @@ from .together import check_excitation, copies, several_logs, unexcited
 
 __all__ = [
     "CHANNELS",
+    "LEAST_STRETCH_S",
     "LEAST_USABLE_S",
     "MEASURED",
     "Channel",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._common.text import number, unit_after
-from ..study import AddedEffect, Study, left_out
+from ..study import AddedEffect, Study, events, left_out
 from . import figures
 from .page import bars, bullets, panel, paragraph, table
 from .samples import Samples
@@ -125,7 +125,8 @@ def _effect(study: Study, added: AddedEffect) -> str:
 def _remains(study: Study) -> str:
     """What is explained and what is not, and what to do about it."""
     steps = [f"Next: {text}." for text in study.next_steps]
-    said = [paragraph(study.in_the_end), *([bullets(steps)] if steps else [])]
+    told = (*events(study), study.in_the_end)
+    said = [*map(paragraph, told), *([bullets(steps)] if steps else [])]
     return panel("6 What remains", said, 12)
 
 

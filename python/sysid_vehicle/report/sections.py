@@ -7,7 +7,7 @@ from collections.abc import Callable
 from .._common.text import html_table, number, unit_after
 from ..estimate import UNITS
 from ..model import Model
-from ..study import LATERAL, Study, open_effects
+from ..study import LATERAL, Study, events, open_effects
 from . import figures
 from .failure import unknown, where_and_when
 from .page import bullets, fold, heading, paragraph, table
@@ -203,7 +203,7 @@ def _remains(study: Study, samples: Samples | None, truth: Model | None) -> list
     ]
     x, y, moment = noise.disturbance
     parts = [
-        paragraph(study.in_the_end),
+        *map(paragraph, (*events(study), study.in_the_end)),
         *([] if samples is None else [figures.residuals(study, samples, _RUNNING)]),
         heading("Noise model", 3),
         table(("sensor", "white noise", "unit"), sensors),

@@ -8,7 +8,7 @@ from .improve import improve
 from .next_drive import next_drive
 from .results.added import AddedEffect
 from .results.hidden import open_effects
-from .results.sentences import left_out
+from .results.sentences import events, left_out
 from .study import Study
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "Verdict",
     "Waterfall",
     "asked",
+    "events",
     "horizons",
     "improve",
     "left_out",

@@ -6,7 +6,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from ..._common.text import html_list, html_paragraph, html_table, text_table
-from .sentences import ahead, left_out, nuisances
+from .sentences import ahead, events, left_out, nuisances
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -19,7 +19,7 @@ def as_text(study: Study) -> str:
     lines = [f"Verdict: {study.verdict} - {study.meaning}."]
     lines += [f"  {a}" for a in study.added]
     lines += [f"  {text}" for text in (*nuisances(study), *study.sensors)]
-    lines.append(text_table(_HEAD, _rows(study)))
+    lines += [text_table(_HEAD, _rows(study)), *events(study)]
     lines += [text for text in (ahead(study), study.in_the_end) if text]
     lines += [f"Next: {text}." for text in study.next_steps]
     lines += [f"Warning: {w}" for w in dict.fromkeys((*study.warnings, *left_out(study)))]
@@ -32,6 +32,7 @@ def as_html(study: Study) -> str:
         f"<p><b>{escape(study.verdict)}</b>: {escape(study.meaning)}.</p>"
         + html_list([*study.added, *nuisances(study), *study.sensors])
         + html_table(_HEAD, _rows(study))
+        + "".join(map(html_paragraph, events(study)))
         + html_paragraph(f"{ahead(study)} {study.in_the_end}".lstrip())
         + html_list([f"Next: {text}." for text in study.next_steps])
     )

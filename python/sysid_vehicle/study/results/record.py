@@ -62,6 +62,7 @@ def record(study: Study) -> dict[str, Any]:
             "train": [c.error for c in study.train],
             "test": [c.error for c in study.test],
         },
+        "events": {"train": _event(study.train[-1]), "test": _event(study.test[-1])},
         "parameters": {e.name: e.to_dict() for e in study.estimates},
         "predicting": None if study.predicting is None else study.predicting.to_dict(),
         "disagreements": [d.to_dict() for d in study.disagreements],
@@ -102,6 +103,10 @@ def _candidate(
             for p, v, s in zip(c.effect.parameters, c.value, c.std, strict=True)
         },
     }
+
+
+def _event(c: Comparison) -> dict[str, Any] | None:
+    return None if c.event is None else c.event.to_dict()
 
 
 def _channels(c: Comparison) -> dict[str, Any]:

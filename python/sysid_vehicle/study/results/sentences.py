@@ -46,6 +46,12 @@ def ahead(study: Study) -> str:
     return f"Median error {AHEAD_S:g} s ahead {where}: {', '.join(told)}."
 
 
+def events(study: Study) -> list[str]:
+    """Moments that hold most of the final model's error, of training and of validation data."""
+    told = ((study.train[-1], "training data"), (study.test[-1], "validation data"))
+    return [c.event.of(data) for c, data in told if c.event is not None]
+
+
 def small(study: Study) -> bool:
     """Whether the baseline's errors 0.5 to 5 s ahead can all be within the usual sizes."""
     return sufficient(study.fits[0], study.validation, sizes_that_matter({})) is not None
