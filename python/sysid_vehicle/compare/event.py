@@ -7,13 +7,12 @@ the largest error above the noise floor:
 
 - Is its part of the squared error worth telling?
 - Does it hold more of what lies above the floor than all other driving together?
-- Is that more than chance? Forces that a model lacks grow with the driving, near the limit with its
-  square. Were these all, the energy of the error in second i would be exponential (two degrees of
-  freedom) with a mean in proportion to q_i, the square of the energy of the driver's commands
-  there. One second w would then hold r times what all others hold with probability
-  prod_i 1 / (1 + r q_i / q_w); for equal q_i this is Fisher's test of the largest share (Proc. R.
-  Soc. A 125, 1929). It is added up over all places of w. So a log of a single manoeuvre, or of one
-  corner that is harder than all others, with all of its error in that, has no event.
+- Is that more than chance? Forces that a model lacks grow with what the driver asks of the car.
+  Were these all, the energy of the error in second i would be exponential (two degrees of freedom)
+  with a mean in proportion to q_i, the energy of his commands there. One second w would then hold
+  r times what all others hold with probability prod_i 1 / (1 + r q_i / q_w); for equal q_i this is
+  Fisher's test of the largest share (Proc. R. Soc. A 125, 1929). It is added up over all places of
+  w. So a log of a single manoeuvre, with all of its error in that, has no event.
 """
 
 from __future__ import annotations
@@ -104,12 +103,14 @@ class Event:
         # What a car does now it was told up to a moment ago.
         before = slice(max(2 * window.start - window.stop, span), window.stop)
         with np.errstate(divide="ignore"):
-            odds = held / (elsewhere * energy[before].sum() ** 2)
-        others = _outside(energy, window, starts) ** 2
+            odds = held / (elsewhere * energy[before].sum())
+        others = _outside(energy, window, starts)
         chance = -np.log1p(odds * others[others > 0.0]).sum()
         if not math.log(driving.samples) + chance <= math.log(USUAL.level):
             return None
-        inside = _narrowed(squares, count, window)
+        inside = _likeliest(driving, squares, count, window)
+        held = above[inside].sum()
+        elsewhere = np.maximum(_outside(above, inside, starts), 0.0).sum()
         log = driving.logs[int(driving.log_number[inside.start])]
         time = driving.channel("time_s")[inside]
         return cls(
@@ -166,14 +167,16 @@ def _commands(driving: Driving) -> FloatArray:
     return energy
 
 
-def _narrowed(squares: FloatArray, count: FloatArray, window: slice) -> slice:
-    """The likeliest part of the window with the variance of all of it, beside the noise floor."""
-    variance = float(squares[window].sum() / count[window].sum())
-    gain = (1.0 - 1.0 / variance) * squares[window] - math.log(variance) * count[window]
-    sums = np.concatenate([[0.0], np.cumsum(gain)])
-    end = int(np.argmax(sums - np.minimum.accumulate(sums)))
-    begin = int(np.argmin(sums[:end]))
-    return slice(window.start + begin, window.start + end)
+def _likeliest(driving: Driving, squares: FloatArray, count: FloatArray, window: slice) -> slice:
+    """The likeliest samples, near a window, to have its mean square, and not that of the others."""
+    high = squares[window].sum() / count[window].sum()
+    low = (squares.sum() - squares[window].sum()) / (count.sum() - count[window].sum())
+    gain = (1.0 / low - 1.0 / high) * squares - np.log(high / low) * count
+    first, end = next((a, b) for a, b, _ in driving.spans if a <= window.start < b)
+    sums = np.concatenate([[0.0], np.cumsum(gain[first:end])])
+    stop = int(np.argmax(sums - np.minimum.accumulate(sums)))
+    begin = int(np.argmin(sums[:stop]))
+    return slice(first + begin, first + stop)
 
 
 def _told(begin: float, end: float) -> tuple[float, float]:

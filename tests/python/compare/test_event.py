@@ -185,7 +185,7 @@ def steered(steer: Callable[[np.ndarray], np.ndarray]) -> Log:
 
 def test_errors_of_a_single_manoeuvre_are_none(rng: np.random.Generator) -> None:
     slalom = steered(lambda t: 0.02 * np.sin(2.0 * t))
-    found = errors_of(slalom, rng, 20.0)
+    found = errors_of(slalom, rng, 20.0, 1.15)
     assert found is not None
     assert found.from_s == pytest.approx(20.0, abs=0.03)
     assert found.until_s == pytest.approx(21.0, abs=0.03)
@@ -195,9 +195,9 @@ def test_errors_of_a_single_manoeuvre_are_none(rng: np.random.Generator) -> None
             + np.where((t > 19.5) & (t < 21.0), 0.05 * np.sin(2.0 * np.pi * (t - 19.5) / 1.5), 0.0)
         )
     )
-    assert errors_of(single, rng, 20.0) is None
+    assert errors_of(single, rng, 20.0, 1.15) is None
     # Where it errs without being steered, something else happened.
-    assert errors_of(single, rng, 30.0) is not None
+    assert errors_of(single, rng, 30.0, 1.15) is not None
 
 
 def test_the_same_part_of_few_seconds_is_chance(rng: np.random.Generator) -> None:
