@@ -69,7 +69,7 @@ class Event:
         return (
             f"{100 * self.share:.0f} % of the squared error{of} above the noise floor lies in "
             f"{number(end - begin, 2)} s of '{self.log}', {begin:.1f} to {end:.1f} s "
-            f"({number(self.error, 2)} times the floor there). Look at what happened then, or "
+            f"({number(self.error, 3)} times the floor there). Look at what happened then, or "
             f"leave these seconds out: {self.remedy}."
         )
 

@@ -33,7 +33,7 @@ def test_a_study_says_it_below_the_errors(hit: sv.Study) -> None:
     at = next(i for i, line in enumerate(lines) if line.startswith("  noise floor"))
     assert lines[at + 1] == (
         "97 % of the squared error of the training data above the noise floor lies in 0.5 s of "
-        "'lap', 12.0 to 12.5 s (38 times the floor there). Look at what happened then, or leave "
+        "'lap', 12.0 to 12.5 s (38.2 times the floor there). Look at what happened then, or leave "
         "these seconds out: take another log."
     )
     assert lines[at + 2].startswith("97 % of the squared error of the validation data above")
