@@ -1,7 +1,7 @@
 """One moment that holds most of a model's error, as something outside the model happened there.
 
-A kerb, a contact, a hand brake or a jump of a sensor leaves its error in less time than any
-disturbance that is learned may last. What a model lacks errs wherever it acts: of drives with a
+A kerb, a contact, a hand brake or a jump of a sensor leaves most of its error in less time than
+any disturbance that is learned may last. What a model lacks errs wherever it acts: of drives with a
 missing effect no second holds more than a part of the error. Three questions, of the second with
 the largest error above the noise floor:
 
@@ -89,7 +89,7 @@ class Event:
         squares, count : array, shape (n,)
             Sum and number of the squares of each sample's whitened residuals at the noise floor.
         longest_s : float
-            What lasts longer is none: the longest that a disturbance may last.
+            Of a moment: the longest that a disturbance may last.
         """
         above = squares - count
         held, span, window = max(_fullest(driving, above, longest_s), key=lambda w: w[0])
