@@ -1,6 +1,6 @@
 """Drives of a car in which something changed since its reference."""
 
-from sysid_vehicle import Log, Model, drive, manoeuvres
+from sysid_vehicle import Change, Log, Model, drive, manoeuvres
 
 OFFSET = "steer_offset.offset_rad"
 LATE = ("steer_delay", "steer_lag")
@@ -13,3 +13,9 @@ def later(truth: Model, **values: float) -> Log:
     more = [n.split(".")[0] for n in told if "." in n and n.split(".")[0] not in truth.effects]
     car = truth.add(*dict.fromkeys(more)).with_values(told)
     return drive(car, manoeuvres.handling_course(15.0, lateral_mps2=7.5), seed=42, rate_hz=50.0)
+
+
+def inside(change: Change, effect: str, value: float) -> bool:
+    """Whether the size of a change is what it should be."""
+    found = change[effect]
+    return abs(found.value[0] - value) < 3.0 * found.std[0]

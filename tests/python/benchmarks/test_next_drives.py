@@ -73,17 +73,10 @@ def test_distances_are_those_of_what_is_there(program: SimpleNamespace) -> None:
 
 @pytest.mark.slow
 def test_a_question_is_followed(program: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
-    near = (
-        "steer_delay",
-        "steer_lag",
-        "tyre_relaxation",
-        "sensor_delay",
-        "yaw_inertia",
-        "aero_drag",
-    )
+    near = ("steer_delay", "steer_lag", "tyre_relaxation", "aero_drag")
     monkeypatch.setattr(sv, "improve", partial(sv.improve, candidates=near))
     monkeypatch.setattr(program.followed, "_STARTS", 1)
-    asked_of_few(monkeypatch, 2)
+    asked_of_few(monkeypatch, 4)
     trial = program.design.Trial("effect", ("steer_delay",), 0.5, "ramp", "nominal", True, "saloon")
     done = program.followed.followed(trial)
     assert done["state"] == "done"

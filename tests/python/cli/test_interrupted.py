@@ -109,7 +109,7 @@ def test_where_it_is_swallowed(swallows: str, tmp_path: Path) -> None:
         assert ended(process) == (130, "ready\n", "sysid-vehicle: interrupted")
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.1, 0.5])
+@pytest.mark.parametrize("seconds", [0.0, pytest.param(0.1, marks=pytest.mark.manual), 0.5])
 def test_a_study_says_so_and_writes_nothing(tmp_path: Path, lap: sv.Log, seconds: float) -> None:
     sv.example_vehicle().to_toml(tmp_path / "car.toml")
     lap.to_csv(tmp_path / "lap.csv")

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from changed_drives import FEW, LATE, OFFSET, later
+from changed_drives import FEW, LATE, inside, later
 
 from sysid_vehicle import (
-    Change,
     Fit,
     InvalidInput,
     Log,
@@ -31,32 +30,6 @@ from sysid_vehicle.diagnose.evidence import evidence
 from sysid_vehicle.estimate import Driving
 
 
-def inside(change: Change, effect: str, value: float) -> bool:
-    found = change[effect]
-    return abs(found.value[0] - value) < 3.0 * found.std[0]
-
-
-def test_what_changed_is_named_with_its_size(offset: Change) -> None:
-    assert [e.id for e in offset.named] == ["steer_offset"]
-    assert not offset.unknown
-    assert inside(offset, "steer_offset", 0.006)
-    assert offset["steer_offset"].std[0] < 3e-4
-    assert offset["steer_ratio"].said == "unchanged"
-    assert offset.after.model.value(OFFSET) == pytest.approx(0.006, abs=5e-4)
-    assert offset.before.model.effects == ()
-
-
-def test_what_would_be_named_is_named(truth: Model, before: Fit, offset: Change) -> None:
-    """A change just as large as the drive is said to name; one that matters little is not."""
-    (ratio,) = offset["steer_ratio"].least
-    assert 3.0 * offset["steer_ratio"].std[0] < ratio < 0.03
-    few = ("steer_offset", "steer_ratio")
-    change = changed(before, later(truth, steer_ratio__ratio_error=ratio), candidates=few)
-    assert [e.id for e in change.named] == ["steer_ratio"]
-    matters = before.model.with_nuisances().parameters["steer_offset.offset_rad"].matters
-    assert matters < offset["steer_offset"].least[0] < 2.0 * matters
-
-
 def test_changes_are_judged_at_the_maximum_as_nothing_is(truth: Model, before: Fit) -> None:
     """A search that holds gains ends below what is a part of its model."""
     effect = next(e for e in before.model.candidates if e.id == "yaw_inertia")
@@ -71,15 +44,6 @@ def test_changes_are_judged_at_the_maximum_as_nothing_is(truth: Model, before: F
     assert top.log_likelihood > state.log_likelihood + 1.0
     assert top.log_likelihood > nothing.log_likelihood
     assert reference.climbed(start, top) is top
-
-
-def test_nothing_is_named_where_nothing_changed(fit: Fit, course: Log) -> None:
-    """Though all of the catalogue may have."""
-    change = changed(fit, course)
-    assert change.named == ()
-    assert change.unknown == ()
-    assert str(change).startswith("no change is shown")
-    assert change["steer_offset"].said == "unchanged"
 
 
 def test_what_the_reference_left_is_no_change(truth: Model, start: Model) -> None:

@@ -1,14 +1,48 @@
-"""What is printed and kept of what changed: sizes, probabilities, and what would have been seen."""
+"""What is named, printed and kept of what changed: sizes, and what would have been seen."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from changed_drives import OFFSET, later
+from changed_drives import OFFSET, inside, later
 from contradictions import contradictions_of_changes
 
 from sysid_vehicle import Change, Fit, Log, Model, changed, load
 from sysid_vehicle._common.text import number
+
+
+@pytest.fixture(scope="module")
+def none(fit: Fit, course: Log) -> Change:
+    """Where nothing changed, though all of the catalogue may have."""
+    return changed(fit, course)
+
+
+def test_nothing_is_named_where_nothing_changed(none: Change) -> None:
+    assert none.named == ()
+    assert none.unknown == ()
+    assert str(none).startswith("no change is shown")
+    assert none["steer_offset"].said == "unchanged"
+
+
+def test_what_changed_is_named_with_its_size(offset: Change) -> None:
+    assert [e.id for e in offset.named] == ["steer_offset"]
+    assert not offset.unknown
+    assert inside(offset, "steer_offset", 0.006)
+    assert offset["steer_offset"].std[0] < 3e-4
+    assert offset["steer_ratio"].said == "unchanged"
+    assert offset.after.model.value(OFFSET) == pytest.approx(0.006, abs=5e-4)
+    assert offset.before.model.effects == ()
+
+
+def test_what_would_be_named_is_named(truth: Model, before: Fit, offset: Change) -> None:
+    """A change just as large as the drive is said to name; one that matters little is not."""
+    (ratio,) = offset["steer_ratio"].least
+    assert 3.0 * offset["steer_ratio"].std[0] < ratio < 0.03
+    few = ("steer_offset", "steer_ratio")
+    change = changed(before, later(truth, steer_ratio__ratio_error=ratio), candidates=few)
+    assert [e.id for e in change.named] == ["steer_ratio"]
+    matters = before.model.with_nuisances().parameters["steer_offset.offset_rad"].matters
+    assert matters < offset["steer_offset"].least[0] < 2.0 * matters
 
 
 def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
@@ -25,9 +59,9 @@ def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
     assert contradictions_of_changes(text) == []
 
 
-def test_what_is_not_testable_has_no_probability(fit: Fit, course: Log, offset: Change) -> None:
+def test_what_is_not_testable_has_no_probability(none: Change, offset: Change) -> None:
     """Nor has what is shown to be unchanged; and each says what it would take to see it."""
-    for change in (offset, changed(fit, course)):
+    for change in (offset, none):
         assert contradictions_of_changes(str(change)) == []
         for e in change.effects:
             told = e.said in ("not testable", "unchanged")

@@ -188,6 +188,7 @@ def test_the_promise_is_that_of_the_size_at_hand(
     car = truth.add("steer_delay").with_values({"steer_delay.delay_s": 0.02})
     log = drive(car, manoeuvres.ramp_steer((18.0, 27.0), 8.0, 4.0), seed=31, rate_hz=50.0)
     fit = identify(start, log, starts=1)
+    asked_of_few(monkeypatch)
     found = suggest_manoeuvre(fit, "steer_delay", "steer_lag")
     best = found.best
     assert found.sizes == "at hand"
@@ -197,7 +198,6 @@ def test_the_promise_is_that_of_the_size_at_hand(
     reached = _reached(start, [log, *more], "steer_delay", "steer_lag")
     # Chance moves a distance by one, the size at hand by as much again.
     assert reached == pytest.approx(best.if_acts["steer_delay"], abs=4.0)
-    asked_of_few(monkeypatch)
     typical = suggest_manoeuvre(fit, "steer_delay", "steer_lag", size=[0.04])
     assert typical.sizes == "given"
     assert "of the size asked for" in str(typical)

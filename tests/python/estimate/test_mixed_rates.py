@@ -103,7 +103,7 @@ def test_an_effect_is_found_in_logs_of_several_rates(
         for i, r in enumerate(RATES[::-1], 10)
     ]
     few = ["tyre_load_sensitivity", "steer_lag", "mass"]
-    study = improve(start, logs, test, starts=1, candidates=few)
+    study = improve(start, logs, test, starts=1, candidates=few, sensors=False)
     assert study.verdict == "explained"
     assert [a.id for a in study.added] == ["tyre_load_sensitivity"]
     found = study.fit["tyre_load_sensitivity.sensitivity"]

@@ -67,7 +67,12 @@ def study() -> Iterator[sv.Study]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sv.SysidWarning)
         yield sv.improve(
-            sv.Model(car), train, test, candidates=["evil", "mass", "steer_lag"], starts=1
+            sv.Model(car),
+            train,
+            test,
+            candidates=["evil", "mass", "steer_lag"],
+            starts=1,
+            sensors=False,
         )
     sv.forget_effect("evil")
 

@@ -45,9 +45,15 @@ def begun(driving: Driving, car: Vehicle, time_s: float) -> Fit:
     return refine(Model(car).add("front_tyre_relaxation"), driving, noise)
 
 
-def test_slow_noise_leads_to_the_maximum_of_fast_noise(driving: Driving, car: Vehicle) -> None:
+@pytest.fixture(scope="module")
+def fast(driving: Driving, car: Vehicle) -> Fit:
+    return begun(driving, car, FAST_S)
+
+
+def test_slow_noise_leads_to_the_maximum_of_fast_noise(
+    driving: Driving, car: Vehicle, fast: Fit
+) -> None:
     """Eight nats lower a moment of 0.2 s takes up what the parameters could explain."""
-    fast = begun(driving, car, FAST_S)
     assert fast.noise.correlation_time_s[2] < 0.06
     for time_s in (0.05, 1.0):
         slow = begun(driving, car, time_s)
@@ -56,9 +62,9 @@ def test_slow_noise_leads_to_the_maximum_of_fast_noise(driving: Driving, car: Ve
 
 
 def test_where_other_noise_fails_what_was_found_stays(
-    driving: Driving, car: Vehicle, monkeypatch: pytest.MonkeyPatch
+    driving: Driving, fast: Fit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fit = begun(driving, car, FAST_S)
+    fit = fast
     objective, _ = objectives(fit.model, driving)
     at_top = fit.model.vector(), fit.noise.vector()
     asked = []
@@ -74,9 +80,9 @@ def test_where_other_noise_fails_what_was_found_stays(
 
 
 def test_other_noise_is_not_climbed_from_where_it_is_hopeless(
-    driving: Driving, car: Vehicle, monkeypatch: pytest.MonkeyPatch
+    driving: Driving, fast: Fit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fit = begun(driving, car, FAST_S)
+    fit = fast
     objective, _ = objectives(fit.model, driving)
     at_top = fit.model.vector(), fit.noise.vector()
     value = objective.log_likelihood(*at_top)

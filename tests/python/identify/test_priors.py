@@ -56,7 +56,7 @@ def test_a_study_tells_what_of_the_user_is_contradicted(
     wrong = free.with_priors({INERTIA: (1200.0, 10.0)})
     with pytest.warns(sv.SysidWarning, match="contradicts"):
         fit = sv.identify(wrong, lap, starts=1)
-    study = sv.improve(wrong, lap, course, starts=1, candidates=[])
+    study = sv.improve(wrong, lap, course, starts=1, candidates=[], sensors=False)
     assert study.verdict == "unknown"
     assert any(w.startswith(f"{INERTIA}: the prior 1200 +- 10") for w in study.warnings)
     assert study.next_steps[0].startswith(f"correct the prior of {INERTIA}")
@@ -68,7 +68,9 @@ def test_a_study_tells_the_bound_at_which_it_ends(
 ) -> None:
     true = free.value(INERTIA)
     bounds = {INERTIA: (1000.0, 1400.0)}
-    study = sv.improve(free.with_bounds(bounds), lap, course, starts=1, candidates=[])
+    study = sv.improve(
+        free.with_bounds(bounds), lap, course, starts=1, candidates=[], sensors=False
+    )
     (said,) = (w for w in study.warnings if w.startswith(f"{INERTIA}: ends at its bound 1400 kg"))
     beyond = float(said.split("to about ")[1].split()[0])
     assert abs(beyond - true) < 0.1 * true

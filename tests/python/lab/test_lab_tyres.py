@@ -130,7 +130,14 @@ def test_gentle_driving_determines_the_stiffness_alone() -> None:
     assert apart[np.ix_(tyres, tyres)].max() == apart.max() > 0.9
 
 
-@pytest.mark.parametrize(("seed", "steer_rad"), [(1, 0.02), (2, 0.03), (3, 0.04)])
+@pytest.mark.parametrize(
+    ("seed", "steer_rad"),
+    [
+        (1, 0.02),
+        pytest.param(2, 0.03, marks=pytest.mark.manual),
+        pytest.param(3, 0.04, marks=pytest.mark.manual),
+    ],
+)
 def test_ends_at_the_bottom_of_the_valley(seed: int, steer_rad: float) -> None:
     # Below the peak B, C, D and E copy each other: damped steps gain little long before the bottom.
     log = driven(seed, steer_rad, seconds=10.0)

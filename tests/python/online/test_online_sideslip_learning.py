@@ -50,11 +50,11 @@ def test_vibration_of_the_longitudinal_accelerometer_takes_no_grip(vehicle, log)
 
 
 def test_a_calibration_drive_teaches_what_to_trust(wrong, log):
-    drive = log.between(0.0, 15.0)
-    found = calibrate_sideslip(wrong, drive, runs=6)
+    drive = log.between(0.0, 10.0)
+    found = calibrate_sideslip(wrong, drive, runs=4)
     assert found.score_after > found.score_before
     assert "log density" in str(found)
-    again = calibrate_sideslip(wrong, drive, runs=6)
+    again = calibrate_sideslip(wrong, drive, runs=4)
     assert dict(again.settings) == dict(found.settings)
 
 

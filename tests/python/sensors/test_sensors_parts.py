@@ -43,7 +43,7 @@ def test_a_scale_that_changes_is_no_fault_of_the_sensor() -> None:
     late = log["time_s"] > 65.0
 
     def found(gain: np.ndarray | float) -> sv.SensorCheck:
-        columns = {c: np.array(log[c]) for c in log.channels if log.has(c)}
+        columns = {c: np.array(log[c]) for c in log.channels if log.has(c) and c != "ax_mps2"}
         columns["ay_mps2"] *= 1.0 + gain
         return sv.check(sv.Log.from_arrays(columns))
 

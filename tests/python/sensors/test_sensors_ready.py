@@ -219,7 +219,7 @@ def test_a_shift_by_parts_of_a_sample_leaves_white_noise_white(delay_s: float) -
 
 
 @pytest.mark.filterwarnings("ignore:.*trigger all sensors by one clock:sysid_vehicle.SysidWarning")
-@pytest.mark.parametrize("off_ms", [3, 4])
+@pytest.mark.parametrize("off_ms", [3, pytest.param(4, marks=pytest.mark.manual)])
 def test_sensors_a_few_ms_apart_have_no_fault(off_ms: int) -> None:
     """Read off straight lines, the noise of the speeds would be that of a low-pass."""
     fine = sv.drive(
@@ -273,6 +273,7 @@ def test_on_a_road_that_wanders_kinematics_tells_no_delays(
     log: sv.Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The driver steers and brakes against the road, which looks like a delay.
+    log = log.between(0.0, 30.0)
     late = _with(log, vx_mps=np.interp(log["time_s"] - 0.03, log["time_s"], log["vx_mps"]))
     checked = sv.check(late)
     assert checked["delay_vx_s"].found

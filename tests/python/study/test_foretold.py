@@ -42,7 +42,7 @@ def studied(
         test,
         candidates=CANDIDATES,
         sensors=False,
-        starts=2,
+        starts=1,
         matters=large if matters else None,
     )
 
@@ -109,7 +109,7 @@ def test_an_uneven_road_is_no_reason_to_look_for_more(start: Model, truth: Model
 def test_tyres_that_no_training_data_showed_are_no_disturbance(start: Model, truth: Model) -> None:
     drives = manoeuvres.sine_sweep(25.0, 25.0, 4.0), manoeuvres.handling_course(30.0, 8.5)
     train, test = (drive(truth, m, seed=s, rate_hz=50.0) for s, m in enumerate(drives, 41))
-    found = improve(start, train, test, candidates=CANDIDATES, sensors=False, starts=2)
+    found = improve(start, train, test, candidates=CANDIDATES, sensors=False, starts=1)
     assert found.verdict == "adequate"
     assert found.train[-1].error < 1.05
     assert found.test[-1].error > 1.2

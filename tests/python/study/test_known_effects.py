@@ -26,7 +26,7 @@ def logs(start: sv.Model) -> tuple[sv.Log, sv.Log]:
 
 @pytest.fixture(scope="module")
 def study(start: sv.Model, logs: tuple[sv.Log, sv.Log]) -> sv.Study:
-    return sv.improve(start.with_fixed(KNOWN), *logs, starts=2)
+    return sv.improve(start.with_fixed(KNOWN), *logs, starts=1, sensors=False)
 
 
 def test_a_study_keeps_it_and_names_what_is_hidden(study: sv.Study) -> None:

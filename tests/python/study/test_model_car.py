@@ -1,6 +1,7 @@
 """A study of a car on a scale of one to eight, which moves as an ordinary one does."""
 
 import pytest
+from few_drives import asked_of_few
 from model_cars import car, drives
 
 import sysid_vehicle as sv
@@ -9,7 +10,7 @@ from sysid_vehicle.estimate import Driving
 
 def test_a_complete_model_is_adequate() -> None:
     train, test = drives(sv.Model(car()), 411)
-    study = sv.improve(sv.Model(car()), train, test)
+    study = sv.improve(sv.Model(car()), train, test, starts=1)
     assert study.verdict == "adequate"
     assert not study.added
 
@@ -18,7 +19,7 @@ def test_a_side_wind_of_an_eighth_of_its_weight_is_named() -> None:
     hidden = {"side_wind.side_force_n": 0.03 * 9.81 * car().mass_kg}
     truth = sv.Model(car()).add("side_wind").with_values(hidden)
     train, test = drives(truth, 413)
-    study = sv.improve(sv.Model(car()), train, test)
+    study = sv.improve(sv.Model(car()), train, test, starts=1)
     assert study.verdict == "explained"
     assert [a.id for a in study.added] == ["side_wind"]
     found = study.fit["side_wind.side_force_n"]
@@ -34,11 +35,15 @@ def test_its_wheel_force_is_believed() -> None:
     assert Driving.of(train).force_known
 
 
-def test_the_next_drive_fits_its_ground() -> None:
+def test_the_next_drive_fits_its_ground(monkeypatch: pytest.MonkeyPatch) -> None:
     train, _ = drives(sv.Model(car()), 417)
+    asked_of_few(monkeypatch)
     found = sv.suggest_manoeuvre(
-        sv.identify(sv.Model(car()), train), "tyre_load_sensitivity", "longitudinal_load_transfer"
+        sv.identify(sv.Model(car()), train, starts=1),
+        "tyre_load_sensitivity",
+        "longitudinal_load_transfer",
     )
+    assert found.suggestions
     limits = sv.DriveLimits.usual(car())
     assert limits.speed_mps == pytest.approx(36.0 * (0.33 / 2.0) ** 0.5, rel=0.05)
     for suggestion in found.suggestions:

@@ -36,7 +36,8 @@ from sysid_vehicle.study.results.sentences import ahead, in_the_end, small
 @pytest.fixture(scope="module")
 def adequate(start: Model, truth: Model) -> Study:
     train, test = (drive(truth, manoeuvres.lap(20.0), seed=s, rate_hz=50.0) for s in (61, 62))
-    return improve(start, train, test, candidates=["mass", "steer_lag"], starts=1)
+    few = ["mass", "steer_lag"]
+    return improve(start, train, test, candidates=few, starts=1, sensors=False)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,8 @@ def unknown(start: Model, truth: Model) -> Study:
     """Nothing in the catalogue that may be tried turns the yaw rate by a constant."""
     biased = truth.add("gyro_bias").with_values({"gyro_bias.bias_radps": 0.02})
     train, test = (drive(biased, manoeuvres.lap(20.0), seed=s, rate_hz=50.0) for s in (63, 64))
-    return improve(start, train, test, candidates=["mass", "aero_drag"], starts=1)
+    few = ["mass", "aero_drag"]
+    return improve(start, train, test, candidates=few, starts=1, sensors=False)
 
 
 def test_a_model_that_may_be_used_asks_for_nothing(adequate: Study) -> None:

@@ -38,7 +38,12 @@ def test_what_a_poorer_model_put_into_them_goes_back_to_the_effect() -> None:
     whole = drive(truth, manoeuvres.handling_course(40.0, 7.0), seed=8731, rate_hz=50.0)
     short = [whole.between(t, t + 6.0) for t in (2.0, 10.0, 18.0, 26.0, 33.5)]
     found = improve(
-        car.with_nuisances(), short[:4], short[4:], candidates=["aero_downforce"], starts=1
+        car.with_nuisances(),
+        short[:4],
+        short[4:],
+        candidates=["aero_downforce"],
+        starts=1,
+        sensors=False,
     )
     assert [a.id for a in found.added] == ["aero_downforce"]
     anew = identify(found.model, short[:4], starts=1)

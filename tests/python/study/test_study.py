@@ -266,7 +266,7 @@ def test_what_no_candidate_explains_is_not_explained(
 ) -> None:
     others = ["aero_drag", "accelerometer_scale", "gyro_bias", "mass", "steer_offset", "side_wind"]
     assert not {*others} & LOOKS_LIKE_LAG
-    found = improve(start, *lagging, starts=1, candidates=others)
+    found = improve(start, *lagging, starts=1, candidates=others, sensors=False)
     assert found.verdict in ("unknown", "partly_explained")
     assert not set(found.model.effects) & LOOKS_LIKE_LAG
     assert found.omnibus.p_value < 0.01 or found.train[-1].error > 1.1
@@ -325,7 +325,7 @@ def test_it_stops_at_the_most_effects_allowed(start: Model, lagging: tuple[Log, 
 
 def test_several_logs_are_fitted_together(start: Model, lap: Log, course: Log) -> None:
     train = [lap.between(0.0, 10.0), lap.between(20.0, 30.0)]
-    found = improve(start, train, [course], starts=1, most_effects=0)
+    found = improve(start, train, [course], starts=1, most_effects=0, sensors=False)
     assert len(found.fit.driving.logs) == 2
     assert set(found.train[0].log_number) == {0.0, 1.0}
     assert set(found.test[0].log_number) == {0.0}
@@ -334,7 +334,7 @@ def test_several_logs_are_fitted_together(start: Model, lap: Log, course: Log) -
 def test_absent_channels_are_among_the_warnings(start: Model, lap: Log, course: Log) -> None:
     train, test = lap.between(0.0, 12.0).without("vy_mps"), course.without("vy_mps")
     with pytest.warns(SysidWarning, match=r"12\.0 s usable .* too short to tell many effects"):
-        found = improve(start, train, test, starts=1, most_effects=0)
+        found = improve(start, train, test, starts=1, most_effects=0, sensors=False)
     assert any("record 20 s or more" in w for w in found.warnings)
     assert [w for w in found.warnings if w.startswith("lap") and train.missing()["vy_mps"] in w]
 

@@ -77,6 +77,7 @@ def test_at_ten_hertz_what_cannot_be_told_apart_is_named_together(truth: Model) 
         drive(car, manoeuvres.handling_course(), seed=1001, rate_hz=10.0),
         candidates=[*sorted(alike), "steer_delay"],
         starts=1,
+        sensors=False,
     )
     (added,) = found.added
     assert {added.id, *added.confounded_with} == alike

@@ -99,7 +99,15 @@ def test_the_baseline_is_asked_whether_its_errors_matter(
     asked: list[Fit] = []
     module = sys.modules["sysid_vehicle.study.judge.judge"]
     monkeypatch.setattr(module, "sufficient", lambda fit, *_: asked.append(fit))
-    study = improve(start, *logs, candidates=["steer_lag"], most_effects=1, starts=1, matters={})
+    study = improve(
+        start,
+        *logs,
+        candidates=["steer_lag"],
+        most_effects=1,
+        starts=1,
+        matters={},
+        sensors=False,
+    )
     assert [a.id for a in study.added] == ["steer_lag"]
     assert len(asked) == 1
     assert asked[0] is study.fits[0]
@@ -142,7 +150,9 @@ def test_effects_of_the_model_take_no_room_of_those_that_may_be_added(
     logs = [drive(lagging, manoeuvres.lap(20.0), seed=seed, rate_hz=50.0) for seed in (71, 72)]
     turned = [altered(log, yaw_rate_radps=log["yaw_rate_radps"] + 0.01) for log in logs]
     offsets = start.with_nuisances()
-    found = improve(offsets, *turned, candidates=["steer_lag"], most_effects=1, starts=1)
+    found = improve(
+        offsets, *turned, candidates=["steer_lag"], most_effects=1, starts=1, sensors=False
+    )
     assert [a.id for a in found.added] == ["steer_lag"]
     assert set(found.model.effects) == {"steer_lag", *offsets.nuisances}
     assert found.verdict == "explained"
@@ -205,7 +215,13 @@ def test_what_the_time_limit_leaves_unknown_is_said(
 
     with pytest.warns(SysidWarning, match="time limit left open"):
         study = improve(
-            start, *logs, candidates=["steer_lag"], most_effects=1, starts=1, time_limit_s=1e5
+            start,
+            *logs,
+            candidates=["steer_lag"],
+            most_effects=1,
+            starts=1,
+            time_limit_s=1e5,
+            sensors=False,
         )
     assert study.explained is None
     assert [a.id for a in study.added] == ["steer_lag"]
