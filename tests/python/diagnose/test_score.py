@@ -92,14 +92,14 @@ def test_family_p_values_come_from_their_seed(null_boards: list[ScoreBoard]) -> 
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("aero_drag.drag_area_m2", 0.1),
+        pytest.param("aero_drag.drag_area_m2", 0.1, marks=pytest.mark.manual),
         ("steer_offset.offset_rad", 0.002),
         ("yaw_inertia.relative_error", 0.05),
-        ("tyre_relaxation.relaxation_length_m", 0.3),
-        ("front_tyre_relaxation.relaxation_length_m", 0.3),
+        pytest.param("tyre_relaxation.relaxation_length_m", 0.3, marks=pytest.mark.manual),
+        pytest.param("front_tyre_relaxation.relaxation_length_m", 0.3, marks=pytest.mark.manual),
         ("rear_tyre_relaxation.relaxation_length_m", 0.3),
         ("force_lag.time_constant_s", 0.1),
-        ("wheel_inertia.mass_share", 0.03),
+        pytest.param("wheel_inertia.mass_share", 0.03, marks=pytest.mark.manual),
         ("body_roll.roll_per_g_rad", 0.02),
     ],
 )

@@ -25,7 +25,7 @@ def still(rng: np.random.Generator, *channels: str) -> sv.Log:
 
 @pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
 @pytest.mark.parametrize("lacks", [(), ("vy_mps",)])
-@pytest.mark.parametrize("seed", [97313, 97314])
+@pytest.mark.parametrize("seed", [pytest.param(97313, marks=pytest.mark.manual), 97314])
 def test_noise_of_the_pull_is_no_evidence(seed: int, lacks: tuple[str, ...]) -> None:
     """A scale of the accelerometer that takes away what it reads had a p-value of 1e-7."""
     log = still(np.random.default_rng(seed), *lacks)

@@ -35,7 +35,11 @@ ALL = {**published.excitations(), **excitation.all()}
 # A manoeuvre has the length that follows from its own parameters.
 OF_ANY_LENGTH = [n for n, e in ALL.items() if not isinstance(e, excitation.OnManoeuvre)]
 CASES = [pytest.param(e, id=name) for name, e in ALL.items() if name not in OF_ANY_LENGTH] + [
-    pytest.param(of_length(ALL[name], duration_s), id=f"{name}-{duration_s:g}s")
+    pytest.param(
+        of_length(ALL[name], duration_s),
+        id=f"{name}-{duration_s:g}s",
+        marks=pytest.mark.manual if duration_s == 120.0 else (),
+    )
     for name in OF_ANY_LENGTH
     for duration_s in DURATIONS_S
 ]
