@@ -4,9 +4,10 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 
+import changed_drives
 import numpy as np
 import pytest
-from changed_drives import FEW, LATE, inside, later
+from changed_drives import FEW, LATE, inside
 
 from sysid_vehicle import (
     Fit,
@@ -29,6 +30,17 @@ from sysid_vehicle.diagnose.change.reference import Reference
 from sysid_vehicle.diagnose.evidence import evidence
 from sysid_vehicle.estimate import Driving
 
+RATE_HZ = 25.0  # of drives of which no delay and nothing small is asked: it takes half as long
+
+
+@pytest.fixture(scope="module")
+def before(start: Model, truth: Model) -> Fit:
+    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=1, rate_hz=RATE_HZ), starts=1)
+
+
+def later(truth: Model, **values: float) -> Log:
+    return changed_drives.later(truth, RATE_HZ, **values)
+
 
 def test_changes_are_judged_at_the_maximum_as_nothing_is(truth: Model, before: Fit) -> None:
     """A search that holds gains ends below what is a part of its model."""
@@ -49,11 +61,14 @@ def test_changes_are_judged_at_the_maximum_as_nothing_is(truth: Model, before: F
 def test_what_the_reference_left_is_no_change(truth: Model, start: Model) -> None:
     """The model lacks a relaxation in both drives; the steering is offset in the second alone."""
     lagging = truth.add("tyre_relaxation").with_values({"tyre_relaxation.relaxation_length_m": 0.4})
-    before = identify(start, drive(lagging, manoeuvres.lap(20.0), seed=7, rate_hz=50.0), starts=1)
+    before = identify(
+        start, drive(lagging, manoeuvres.lap(20.0), seed=7, rate_hz=RATE_HZ), starts=1
+    )
     same = changed(before, later(lagging), candidates=("steer_lag", "tyre_relaxation"))
     assert same.named == ()
     few = ("steer_offset", "tyre_relaxation")
-    other = changed(before, later(lagging, steer_offset__offset_rad=0.002), candidates=few)
+    moved = changed_drives.later(lagging, steer_offset__offset_rad=0.002)
+    other = changed(before, moved, candidates=few)
     assert [e.id for e in other.named] == ["steer_offset"]
     assert inside(other, "steer_offset", 0.002)
 
@@ -129,7 +144,8 @@ def test_what_both_share_need_not_be_nothing(truth: Model, start: Model) -> None
     delay = "steer_delay.delay_s"
     late = truth.add("steer_delay").with_values({delay: 0.03})
     before = identify(start, drive(late, manoeuvres.lap(20.0), seed=7, rate_hz=50.0), starts=1)
-    change = changed(before, later(truth, steer_delay__delay_s=-0.01), candidates=LATE)
+    early = changed_drives.later(truth, steer_delay__delay_s=-0.01)
+    change = changed(before, early, candidates=LATE)
     assert [e.id for e in change.named] == ["steer_delay"]
     assert inside(change, "steer_delay", -0.04)
     assert change.after.model.effects == ("steer_delay",)

@@ -48,9 +48,9 @@ def test_an_interval_that_holds_nothing_names_no_tyre(
 
 def test_errors_of_a_tyre_are_those_of_its_force(truth: Model) -> None:
     """Where the stiffness is known and B, C and D are not, and a large change bends that line."""
-    log = drive(truth, manoeuvres.lap(20.0, lateral_mps2=4.0), seed=31, rate_hz=50.0)
+    log = drive(truth, manoeuvres.lap(20.0, lateral_mps2=4.0), seed=31, rate_hz=25.0)
     softer = truth.with_values({"B_rear": 0.8 * truth.value("B_rear")})
-    later = drive(softer, manoeuvres.lap(20.0, lateral_mps2=4.0), seed=32, rate_hz=50.0)
+    later = drive(softer, manoeuvres.lap(20.0, lateral_mps2=4.0), seed=32, rate_hz=25.0)
     known = identify(truth, log, starts=1)
     assert known["B_rear"].std > 0.3 * known["B_rear"].value
     change = changed(known, later, candidates=("steer_ratio",))
