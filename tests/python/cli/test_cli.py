@@ -55,12 +55,11 @@ def asked(model: sv.Model, *logs: Any, **keywords: Any) -> str:
 
 @pytest.fixture(scope="module")
 def improved(folder: Path) -> tuple[Path, dict[str, Any]]:
-    """Folder and JSON of one `improve` run."""
+    """Folder and JSON of one `improve` run, whose searches start from the vehicle file alone."""
     real = commands.improve
 
     def kept(*args: Any, **keywords: Any) -> sv.Study:
-        study = real(*args, **{**keywords, "starts": 1})  # the vehicle file is right
-        STUDIES.append((asked(*args, **keywords), study))
+        STUDIES.append((asked(*args, **keywords), real(*args, **{**keywords, "starts": 1})))
         return STUDIES[-1][1]
 
     with pytest.MonkeyPatch.context() as patch:

@@ -130,17 +130,10 @@ def test_gentle_driving_determines_the_stiffness_alone() -> None:
     assert apart[np.ix_(tyres, tyres)].max() == apart.max() > 0.9
 
 
-@pytest.mark.parametrize(
-    ("seed", "steer_rad"),
-    [
-        (1, 0.02),
-        pytest.param(2, 0.03, marks=pytest.mark.manual),
-        pytest.param(3, 0.04, marks=pytest.mark.manual),
-    ],
-)
-def test_ends_at_the_bottom_of_the_valley(seed: int, steer_rad: float) -> None:
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.manual) for s in (2, 3))])
+def test_ends_at_the_bottom_of_the_valley(seed: int) -> None:
     # Below the peak B, C, D and E copy each other: damped steps gain little long before the bottom.
-    log = driven(seed, steer_rad, seconds=10.0)
+    log = driven(seed, 0.01 * (seed + 1), seconds=10.0)
     fit = identify_tyres(CAR, log, starts=1, profiles=False)
     objective = objective_of(CAR, [log])
     box = box_of([e.name for e in fit.estimates], {})

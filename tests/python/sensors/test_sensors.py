@@ -22,7 +22,7 @@ NOISE = sv.SensorNoise()
 
 
 @pytest.fixture(scope="module")
-def half_a_minute() -> Channels:
+def perfect() -> Channels:
     """30 s of a handling course as sensors without noise and faults would write it."""
     truth = sv.Model(sv.example_vehicle())
     push = sv.RoadDisturbance(150.0, 200.0, 100.0, 0.3)
@@ -30,12 +30,6 @@ def half_a_minute() -> Channels:
     none = sv.SensorNoise.none()
     log = drive_truth(truth, course, seed=11, noise=none, disturbance=push).log.between(0.0, 30.0)
     return {name: np.array(log[name]) for name in log.channels}
-
-
-@pytest.fixture(scope="module")
-def perfect(half_a_minute: Channels) -> Channels:
-    """The first 25 s of it, for what needs no more."""
-    return {name: values[:2501] for name, values in half_a_minute.items()}
 
 
 def noisy(channels: Channels, seed: int = 5) -> Channels:
@@ -214,8 +208,8 @@ def test_the_mean_of_a_driving_acceleration_is_taken_out(faulty: sv.SensorCheck)
     np.testing.assert_array_equal(found.apply(log)["ax_mps2"], faulty.apply(log)["ax_mps2"])
 
 
-def test_a_slow_channel_enters_at_its_own_times(half_a_minute: Channels) -> None:
-    c = with_faults(half_a_minute)
+def test_a_slow_channel_enters_at_its_own_times(perfect: Channels) -> None:
+    c = with_faults(perfect)
     for name in ("vx_mps", "vy_mps"):
         slow = np.full(c[name].size, np.nan)
         slow[::5] = c[name][::5]
@@ -227,12 +221,12 @@ def test_a_slow_channel_enters_at_its_own_times(half_a_minute: Channels) -> None
         assert found[name].found
 
 
-def test_estimates_scatter_no_more_than_they_say(half_a_minute: Channels) -> None:
+def test_estimates_scatter_no_more_than_they_say(perfect: Channels) -> None:
     """Noise times the derivative of noise would move delays and places by several times that."""
     rng, names = np.random.default_rng(40), ("delay_ay_s", "delay_vy_s", "imu_forward_m")
     off = []
     for seed in range(6):
-        c = noisy(half_a_minute, 50 + seed)
+        c = noisy(perfect, 50 + seed)
         for name in ("ax_mps2", "ay_mps2"):
             fresh = rng.standard_normal(c[name].size) * 0.03 * np.sqrt(1.0 - np.exp(-0.02 / 0.3))
             c[name] = c[name] + lfilter([1.0], [1.0, -np.exp(-0.01 / 0.3)], fresh)
