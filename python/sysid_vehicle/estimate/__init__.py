@@ -3,7 +3,7 @@
 from ..log import MEASURED
 from .alike import alike_in_force, without_force, without_unlearned
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
-from .driving import UNITS, Driving
+from .driving import UNITS, Driving, steering_reach
 from .filters import FilterRun, FilterState, StateFilter, StateModel
 from .input_noise import again, noisier
 from .late import LateMeasurements
@@ -44,6 +44,7 @@ __all__ = [
     "noise_range",
     "noisier",
     "promised_by_noise",
+    "steering_reach",
     "turning",
     "turning_blocks",
     "whiteness_check",

@@ -32,6 +32,11 @@ WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True
 _REACH_S = effect("steer_delay").parameters[0].upper  # either way
 
 
+def steering_reach(rate_hz: float) -> int:
+    """Samples before and after others whose steering a delay may ask for."""
+    return round(_REACH_S * rate_hz) + _core.SHIFT_REACH
+
+
 class Span(NamedTuple):
     """First and end of a stretch among all usable samples, and its rate."""
 
@@ -381,7 +386,7 @@ class Driving:
             return [], []
         begin, end, size = (x - whole.start for x in (where.start, where.stop, whole.stop))
         inputs = self._inputs(log, whole) if other_inputs is None else other_inputs[at : at + size]
-        reach = round(_REACH_S * log.rate_hz) + _core.SHIFT_REACH
+        reach = steering_reach(log.rate_hz)
         steer = inputs[:, 0]
         return steer[max(begin - reach, 0) : begin].tolist(), steer[end : end + reach].tolist()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from .._common.arguments import expect, generator
 from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Told
 from .._common.typed import typed
-from ..effects import channels_in_use
+from ..effects import channels_in_use, effect
 from ..errors import InvalidInput, NumericalError
 from ..log import CHANNELS, MEASURED, Log
 from ..manoeuvres import Manoeuvre
@@ -27,6 +28,7 @@ Channel = float | FloatArray | Callable[[FloatArray], FloatArray]
 """A column of the log: a constant, its samples, or a function of the time of all samples [s]."""
 
 _STOPPED_MPS = 1.0  # where the core's simulator gives up
+(_LATE,) = effect("steer_delay").named
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,19 +110,23 @@ def drive_truth(
     n = len(references)
     logged = _channels(model, channels or {}, np.arange(n) / rate_hz)
     external = (disturbance or RoadDisturbance()).sample(n, rate_hz, rng)
-    inputs, states, outputs, lost_at = _core.simulate(
+    lead = _lead(model, rate_hz)
+    *driven, lost_at = _core.simulate(
         model.core(),
         model.vector(),
         1.0 / rate_hz,
-        references,
+        _from_before(references, lead),
         manoeuvre.driver(model.vehicle),
-        external,
+        np.vstack([np.zeros_like(external[:lead]), external]),
         float(references[0, 0]),
-        channels=_by_number(logged, n),
+        start=-lead / rate_hz,
+        channels=_from_before(_by_number(logged, n), lead),
         farthest_m=farthest_m,
     )
-    if lost_at < n:
-        raise NumericalError(_how_it_was_lost(manoeuvre, states[-1], lost_at / rate_hz, farthest_m))
+    if lost_at < lead + n:
+        lost_s = max(lost_at - lead, 0) / rate_hz
+        raise NumericalError(_how_it_was_lost(manoeuvre, driven[1][-1], lost_s, farthest_m))
+    inputs, states, outputs = (as_float64(x[lead:]) for x in driven)
     if not np.isfinite(outputs).all():
         k = int(np.flatnonzero(~np.isfinite(outputs).all(axis=1))[0])
         raise NumericalError(
@@ -139,6 +145,21 @@ def drive_truth(
     names = [f"{e.id}.{s.name}" for e in model.parts for s in e.own_states]
     own = {name: states[:, _core.USER_STATES_FROM + i] for i, name in enumerate(names)}
     return Drive(log, model, manoeuvre, references, inputs, states[:, :3], outputs, external, own)
+
+
+def _lead(model: Model, rate_hz: float) -> int:
+    """Samples driven before the log begins.
+
+    Wheels that act late do at its beginning what was asked of them before. A driver begins to steer
+    at once: that kink is in no log, and whoever reads it would take it for a lag.
+    """
+    late_s = model.value(_LATE) if _LATE in model.parameters else 0.0
+    return math.ceil(late_s * rate_hz) + 1 if late_s > 0.0 else 0
+
+
+def _from_before(rows: FloatArray, lead: int) -> FloatArray:
+    """The same, which before their beginning were what they are there."""
+    return as_float64(np.vstack([np.repeat(rows[:1], lead, axis=0), rows]))
 
 
 def _by_number(logged: Mapping[str, FloatArray], n: int) -> FloatArray:

@@ -17,7 +17,7 @@ from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import check_time
 from ...errors import NumericalError
-from ...estimate import MEASURED, generous
+from ...estimate import MEASURED, generous, steering_reach
 from ...identify import Fit, free_box, objective_of, settle
 from ...identify.search.search import Box, minimise
 from ...log import Log
@@ -226,7 +226,15 @@ class Replay:
                 inputs[:, 1] = outputs[:, _A_X]
                 reading[:, _A_X] = np.nan
             inputs = as_float64(np.column_stack([inputs, s.channels]))
-            problem.add_run(s.dt, inputs, as_float64(reading), s.start_s, shift=s.shift)
+            problem.add_run(
+                s.dt,
+                inputs,
+                as_float64(reading),
+                s.start_s,
+                # The car that was driven had stood so before.
+                steer_before=[float(inputs[0, 0])] * steering_reach(1.0 / s.dt),
+                shift=s.shift,
+            )
         return problem
 
     @cached_property
