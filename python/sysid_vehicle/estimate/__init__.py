@@ -3,7 +3,7 @@
 from ..log import MEASURED
 from .alike import alike_in_force, without_force, without_unlearned
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
-from .driving import UNITS, Driving, steering_reach
+from .driving import UNITS, Driving
 from .filters import FilterRun, FilterState, StateFilter, StateModel
 from .input_noise import again, noisier
 from .late import LateMeasurements
@@ -17,6 +17,7 @@ from .noise import (
     noise_range,
     promised_by_noise,
 )
+from .samples import steering_reach
 from .turning import equal_blocks, moving, turning, turning_blocks
 
 __all__ = [

@@ -12,7 +12,7 @@ import numpy as np
 from .. import _core
 from .._common.arrays import FloatArray, as_float64
 from .._common.text import brief
-from ..effects import Effect, channels_in_use, effect
+from ..effects import Effect, channels_in_use
 from ..errors import InvalidInput
 from ..log import CHANNELS, MEASURED, Log, several_logs
 from ..model import Model
@@ -24,17 +24,10 @@ from .inputs import quiet
 from .known_filters import KnownFilters, KnownProblem
 from .leads import cut
 from .pieces import DrivingProblem, PiecewiseProblem
-from .samples import Samples, between, thinned
+from .samples import Samples, between, steering_reach, thinned
 
 UNITS = {c: CHANNELS[c].unit for c in MEASURED}
 WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))
-
-_REACH_S = effect("steer_delay").parameters[0].upper  # either way
-
-
-def steering_reach(rate_hz: float) -> int:
-    """Samples before and after others whose steering a delay may ask for."""
-    return round(_REACH_S * rate_hz) + _core.SHIFT_REACH
 
 
 class Span(NamedTuple):

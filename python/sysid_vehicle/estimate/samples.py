@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from .. import _core
+from ..effects import effect
 from ..log import Log
 
+_REACH_S = effect("steer_delay").parameters[0].upper  # either way
 _WINDOW_S, _SHORTEST = 2.0, 50  # of windows of thinned driving; samples, at least
 
 
@@ -16,6 +19,11 @@ class Samples(NamedTuple):
     log: Log
     where: slice
     at: int
+
+
+def steering_reach(rate_hz: float) -> int:
+    """Samples before and after others whose steering a delay may ask for."""
+    return round(_REACH_S * rate_hz) + _core.SHIFT_REACH
 
 
 def between(whole: Sequence[Samples], begin: int, end: int) -> list[Samples]:
