@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from .._common.progress import note
@@ -65,7 +65,7 @@ def _compare(args: argparse.Namespace, heard: Warnings) -> None:
 def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
     _define(args)
     study = _study(args, heard)
-    print(study.test[0])
+    print(replace(study.test[0], event=None))  # those of the final model follow
     print()
     print(ranking_title(study))
     rows = [[cell.replace("±", "+-") for cell in row] for row in ranking_rows(study, most=12)]

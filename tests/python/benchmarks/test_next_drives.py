@@ -71,7 +71,7 @@ def test_distances_are_those_of_what_is_there(program: SimpleNamespace) -> None:
     assert "promised 5 and more: reached 5 in 3 of 3, at least 7.0" in text
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_question_is_followed(program: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     near = ("steer_delay", "steer_lag", "tyre_relaxation", "aero_drag")
     monkeypatch.setattr(sv, "improve", partial(sv.improve, candidates=near))

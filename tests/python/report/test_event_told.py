@@ -99,3 +99,16 @@ def test_compare_writes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     event = json.loads((tmp_path / "out.json").read_text("utf-8"))["event"]
     assert np.isclose(event["from_s"], 15.0, atol=0.1)
     assert "of the squared error above the noise floor lies in" in capsys.readouterr().out
+
+
+def test_diagnose_tells_it_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    truth = sv.Model(sv.example_vehicle())
+    road = Push(at_s=15.0)
+    truth.vehicle.to_toml(tmp_path / "car.toml")
+    for i, name in enumerate(("lap", "again")):
+        pushed = road if name == "again" else None
+        log = sv.drive(truth, sv.manoeuvres.lap(30.0), seed=9 + i, rate_hz=50.0, disturbance=pushed)
+        log.to_csv(tmp_path / f"{name}.csv")
+    lap, again, car = (str(tmp_path / name) for name in ("lap.csv", "again.csv", "car.toml"))
+    assert main(["diagnose", lap, "--test", again, "--vehicle", car]) == 0
+    assert capsys.readouterr().out.count("of the squared error") == 1
