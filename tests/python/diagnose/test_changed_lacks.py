@@ -50,6 +50,22 @@ def test_a_lack_of_the_reference_is_no_change(truth: Model, start: Model) -> Non
     assert changed.among - nothing.among < 5.0
 
 
+def test_what_the_reference_alone_shows_to_be_missing_is_put_in(truth: Model) -> None:
+    """Though the change explains far more: beside it a delay was known four times worse."""
+    car = truth.add("steer_compliance").with_values({"steer_compliance.compliance_radpn": 1.5e-6})
+    late = car.add("steer_delay").with_values({"steer_delay.delay_s": 0.05})
+    course = manoeuvres.handling_course(20.0, lateral_mps2=7.5)
+    first, second = (
+        drive(c, course, seed=seed, rate_hz=50.0) for c, seed in ((car, 245601), (late, 245701))
+    )
+    few = ("steer_delay", "steer_lag", "steer_compliance")
+    change = changed(identify(truth, first, starts=1), second, candidates=few)
+    assert change.lacks == ("steer_compliance",)
+    assert next(e.id for e in change.named) == "steer_delay"
+    assert change["steer_delay"].std[0] < 0.002
+    assert abs(change["steer_delay"].value[0] - 0.05) < 3.0 * change["steer_delay"].std[0]
+
+
 @pytest.mark.parametrize("calm", [False, True])
 def test_it_is_put_into_the_model_of_the_reference(
     truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, calm: bool

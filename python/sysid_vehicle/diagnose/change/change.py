@@ -42,8 +42,8 @@ class Change(Printed):
         as estimates differ between pieces of the reference.
     rules : Rules
     lacks : tuple of str
-        Effects that the reference lacked, and that were put into its model: in both drivings the
-        same they explain more than what seemed to have changed without them.
+        Effects that the reference lacked, and that were put into its model: it shows them alone,
+        or in both drivings the same they explain more than what seemed to have changed.
     """
 
     before: Fit

@@ -24,6 +24,7 @@ from ...log import Log
 from ...model import Model
 from ...rules import USUAL, Rules
 from ...vehicle import Vehicle
+from ..diagnose import diagnose
 from .change import Change
 from .may_change import YAW_INERTIA
 from .saying import Saying
@@ -45,7 +46,8 @@ def changed(
     """Tell what of a car changed since a reference: yesterday's log fits the model, today's not.
 
     What the reference left unexplained counts only as far as the later driving leaves more. Where
-    an effect that is in both the same explains more than what seems to have changed, the reference
+    something seems to have changed, and the reference alone shows what is missing in its model
+    (`diagnose`), or an effect that is in both the same explains more than the change, the reference
     lacks it: it is put into its model, and the drivings are compared again (`Change.lacks`). Both
     are taken as independent; noise is that of the reference. What a model lacks acts otherwise at
     other speeds or lateral accelerations: as far as the later driving is there (`Change.alike`),
@@ -94,11 +96,28 @@ def changed(
     while True:
         said = Saying(Search(before, _later(before, driving, vehicle), candidates, rules))
         change = said.change()
-        lack = said.lack() if len(lacks) < _LACKS and not change.calm else None
+        lack = None
+        if len(lacks) < _LACKS and not change.calm:
+            lack = said.lack() or _named_in(before, candidates, rules)
         if lack is None:
             return replace(change, lacks=tuple(lacks))
         lacks.append(lack.id)
         before = identify(before.model.add(lack), before.driving, starts=1)
+
+
+def _named_in(
+    before: Fit, candidates: Sequence[str | Effect] | None, rules: Rules
+) -> Effect | None:
+    """The one effect that the reference alone shows to be missing: it bends what is beside it.
+
+    A delay of the steering beside a compliance that the model lacks is likelier a lag.
+    """
+    found = diagnose(before, candidates=candidates, rules=rules)
+    if found.named is None:
+        return None
+    group = found.causes.of(found.named.id)
+    # One of a group may be the wrong one: what it does not explain would be called a change.
+    return found.named.effect if group is not None and len(group.effects) == 1 else None
 
 
 def _later(before: Fit, driving: Driving, vehicle: Vehicle | None) -> Fit:
