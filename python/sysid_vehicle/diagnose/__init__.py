@@ -17,8 +17,8 @@ from .candidates.possible import (
 from .candidates.verdicts import EffectVerdict, Verdicts
 from .candidates.widened import widened
 from .change.change import Change
-from .change.changed import changed
 from .change.effect_change import EffectChange, LoadChange
+from .changed import changed
 from .diagnose import diagnose, with_unfollowed
 from .evidence.coordinates import blocks
 from .evidence.evidence import Evidence

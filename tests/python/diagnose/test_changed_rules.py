@@ -7,10 +7,10 @@ import pytest
 from changed_drives import later
 
 from sysid_vehicle import Fit, Log, Model, drive, identify, manoeuvres
-from sysid_vehicle.diagnose.change.changed import _later
 from sysid_vehicle.diagnose.change.reference import Exact
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
+from sysid_vehicle.diagnose.changed import _later
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
 

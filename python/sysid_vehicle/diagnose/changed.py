@@ -1,10 +1,10 @@
 """What changed between a reference and later driving of the same car.
 
 Everything that the reference left stays where it was: effects of the model and of the catalogue,
-tyres, unknown forces, shifted clocks compete for what is new (`beside_reference.py`), as a sum of
-single effects (`changes_compete.py`). A large change bends every line that is drawn from the
-reference: so the leading ones are fitted exactly, the scores taken anew from there, and the exact
-likelihoods decide between what was fitted.
+tyres, unknown forces, shifted clocks compete for what is new (`change/beside_reference.py`), as a
+sum of single effects (`change/changes_compete.py`). A large change bends every line that is drawn
+from the reference: so the leading ones are fitted exactly, the scores taken anew from there, and
+the exact likelihoods decide between what was fitted.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..._common.typed import typed
-from ...effects import Effect
-from ...errors import InvalidInput
-from ...estimate import Driving
-from ...identify import Fit, explaining, identify
-from ...identify.offsets import centred
-from ...log import Log
-from ...model import Model
-from ...rules import USUAL, Rules
-from ...vehicle import Vehicle
-from ..diagnose import diagnose
-from .change import Change
-from .may_change import YAW_INERTIA
-from .saying import Saying
-from .search import Search
+from .._common.typed import typed
+from ..effects import Effect
+from ..errors import InvalidInput
+from ..estimate import Driving
+from ..identify import Fit, explaining, identify
+from ..identify.offsets import centred
+from ..log import Log
+from ..model import Model
+from ..rules import USUAL, Rules
+from ..vehicle import Vehicle
+from .change.change import Change
+from .change.may_change import YAW_INERTIA
+from .change.saying import Saying
+from .change.search import Search
+from .diagnose import diagnose
 
 _LACKS = 2  # effects that are put into the model of a reference, at most
 
