@@ -94,15 +94,33 @@ def changed(
         )
     lacks: list[str] = []
     while True:
-        said = Saying(Search(before, _later(before, driving, vehicle), candidates, rules))
-        change = said.change()
-        lack = None
-        if len(lacks) < _LACKS and not change.calm:
-            lack = said.lack() or _named_in(before, candidates, rules)
-        if lack is None:
-            return replace(change, lacks=tuple(lacks))
-        lacks.append(lack.id)
-        before = identify(before.model.add(lack), before.driving, starts=1)
+        search = Search(before, _later(before, driving, vehicle), candidates, rules)
+        found = _compared(search, candidates, may_lack=len(lacks) < _LACKS)
+        if isinstance(found, Change):
+            return replace(found, lacks=tuple(lacks))
+        lacks.append(found.id)
+        before = identify(before.model.add(found), before.driving, starts=1)
+
+
+def _compared(
+    search: Search, candidates: Sequence[str | Effect] | None, *, may_lack: bool
+) -> Change | Effect:
+    """What changed, or what has to be put into the model of the reference first.
+
+    What the reference shows alone is asked for as soon as a single change is shown: beside a lack
+    the search goes far astray.
+    """
+    shown = search.nothing(search.singles) <= 1.0 - search.rules.credible
+    if may_lack and shown:
+        lack = _named_in(search.before, candidates, search.rules)
+        if lack is not None:
+            return lack
+    said = Saying(search)
+    change = said.change()
+    lack = said.lack() if may_lack and not change.calm else None
+    if may_lack and not (change.calm or shown or lack):
+        lack = _named_in(search.before, candidates, search.rules)
+    return change if lack is None else lack
 
 
 def _named_in(

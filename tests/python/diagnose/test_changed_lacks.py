@@ -8,10 +8,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from sysid_vehicle import Model, changed, drive, effect, identify, manoeuvres
+from sysid_vehicle import Fit, Model, changed, drive, effect, identify, manoeuvres
 from sysid_vehicle.diagnose.change.may_change import of_effect
 from sysid_vehicle.diagnose.change.reference import Exact, Reference
 from sysid_vehicle.diagnose.change.saying import Saying
+from sysid_vehicle.diagnose.change.search import Search
 from sysid_vehicle.effects import Effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
@@ -64,6 +65,34 @@ def test_what_the_reference_alone_shows_to_be_missing_is_put_in(truth: Model) ->
     assert next(e.id for e in change.named) == "steer_delay"
     assert change["steer_delay"].std[0] < 0.002
     assert abs(change["steer_delay"].value[0] - 0.05) < 3.0 * change["steer_delay"].std[0]
+
+
+@pytest.mark.parametrize("something", [0.0, 0.5])
+def test_it_is_asked_for_before_the_search_where_something_changed(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, something: float
+) -> None:
+    """Beside what is lacked the search goes astray, for many times as long."""
+    before = identify(start, drive(truth, manoeuvres.lap(10.0), seed=3, rate_hz=50.0), starts=1)
+    module, asked = sys.modules[changed.__module__], []
+
+    def shows(fit: Fit, *_: object) -> Effect | None:
+        asked.append(f"alone {fit.model.effects}")
+        return None if fit.model.effects else effect(DOWNFORCE)
+
+    class Asked(Saying):
+        def __init__(self, search: Search) -> None:
+            asked.append(f"search {search.before.model.effects}")
+            super().__init__(search)
+
+    monkeypatch.setattr(Search, "nothing", lambda *_: something)
+    monkeypatch.setattr(module, "_named_in", shows)
+    monkeypatch.setattr(module, "Saying", Asked)
+    change = changed(before, before.driving.logs[0], candidates=("steer_ratio",))
+    # Nothing changed in the same log: the search alone finds that, and nothing is asked.
+    full = (DOWNFORCE,)
+    told = [f"alone {()}", f"alone {full}", f"search {full}"]
+    assert asked == ([f"search {()}"] if something else told)
+    assert change.lacks == (() if something else full)
 
 
 @pytest.mark.parametrize("calm", [False, True])

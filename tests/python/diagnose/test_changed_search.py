@@ -63,6 +63,21 @@ def test_what_is_named_was_put_in_and_is_off_nothing(monkeypatch: pytest.MonkeyP
     assert search.visited[frozenset(state.put)] is state
 
 
+def test_of_several_that_no_line_tells_what_is_missed_least_goes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beside its stand-ins a tyre that changed is known to no one: they go, and lines tell it."""
+    tyre, other = ("tyre_front",), ("lateral_load_transfer",)
+    both = tyre + other
+    evidence = {(): -900.0, both: 9.0, tyre: 7.0, other: -400.0}
+    search = searching(monkeypatch, dict.fromkeys(both, 0.5), evidence)
+    known = {both: dict.fromkeys(both, 0.5), tyre: {"tyre_front": 1e-9}}
+    known[both]["tyre_front"] = 0.9
+    monkeypatch.setattr(search, "told", lambda state: Told(state.put, known[state.put]))
+    told, state = search._shown(Told(both, known[both]), search.visited[frozenset(both)])
+    assert state.put == told.put == tyre
+
+
 def test_what_is_not_worth_its_price_goes(monkeypatch: pytest.MonkeyPatch) -> None:
     """By a small variance ratio it was put in; that of all together is what counts in the end."""
     lines = dict.fromkeys(("steer_delay", "mass", "yaw_inertia"), 1e-9)

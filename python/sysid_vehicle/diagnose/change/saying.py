@@ -44,7 +44,7 @@ class Saying:
         shown = [s for s in exact.values() if s is not None]
         causes = priced.causes.only([*shown, *self._not_refused(priced, few)], {})
         sizes, stds = self._told_sizes(shown, few)
-        nothing = self._nothing()
+        nothing = search.nothing(told)
         calm = nothing > 1.0 - search.rules.credible
         found = [self._of(m, causes, sizes, stds, told, calm=calm) for m in self.search.may]
         order = [e for s in causes.sets for e in s.effects]
@@ -106,19 +106,6 @@ class Saying:
         if rises > 0.0:
             sizes[name] = size
         stds[name] = max(stds[name], abs(sizes[name]) / float(np.sqrt(max(rises, 1.0))))
-
-    def _nothing(self) -> float:
-        """Probability that nothing changed, beside all that was fitted.
-
-        Likelihoods count as much less as intervals are wider by what a model lacks elsewhere.
-        """
-        search, told = self.search, self.told
-        odds = [
-            search.over_nothing(s, told, told.width_of(s.put))
-            for s in search.visited.values()
-            if s.put
-        ]
-        return float(scipy.special.expit(-scipy.special.logsumexp(odds))) if odds else 1.0
 
     def lack(self) -> Effect | None:
         """What the reference lacks: in both drivings the same it explains more than any change."""

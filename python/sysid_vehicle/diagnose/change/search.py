@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -106,8 +107,9 @@ class Search:
             return SCALINGS
         return ()
 
-    def found(self) -> tuple[Competition, Exact]:
-        """What competes where the changes that explain most have been put in, and these."""
+    @cached_property
+    def singles(self) -> Competition:
+        """What competes beside nothing, where what may have changed alone has been fitted."""
         begin = self.reference.fitted(self.start, (), {}, {})
         self.visited[frozenset()] = begin
         # Lines are drawn from the reference: where nothing may change it goes far from any car.
@@ -117,6 +119,11 @@ class Search:
         at_once = [s for s in (PAYLOAD, tuple(e.id for e in SCALINGS)) if self.can.keys() >= set(s)]
         for few in (self._leading(told, begin), *alone, *at_once):
             self._visit(few, told)
+        return told
+
+    def found(self) -> tuple[Competition, Exact]:
+        """What competes where the changes that explain most have been put in, and these."""
+        told = self.singles
         state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
         seen: set[tuple[str, ...]] = set()
         for _ in range(_ROUNDS):
@@ -175,16 +182,21 @@ class Search:
         gone: set[frozenset[str]] = set()
         for _ in range(_ROUNDS):
             while state.put:
-                p_values = {e: self._off_nothing(e, state, told) for e in as_one(state.put)}
-                least = max(p_values, key=lambda e: p_values[e])
-                rest = tuple(e for e in state.put if e not in least)
-                if p_values[least] <= 1.0 - self.rules.credible:
+                weak = [
+                    e
+                    for e in as_one(state.put)
+                    if self._off_nothing(e, state, told) > 1.0 - self.rules.credible
+                ]
+                rests = [tuple(e for e in state.put if e not in several) for several in weak]
+                for rest in rests:
+                    self._visit(rest, told)
+                ratio = told.ratio_of(state.put)
+                fitted = [self.visited[k] for k in map(frozenset, rests) if k in self.visited]
+                if not fitted:
                     break
-                self._visit(rest, told)
-                if frozenset(rest) not in self.visited:
-                    break
+                # Of several that no line tells beside each other, what is missed least goes.
                 gone.add(frozenset(state.put))
-                state = self.visited[frozenset(rest)]
+                state = max(fitted, key=lambda s: self.evidence(s, told, ratio))
                 told = self.told(state)
             for e in self._leading(told, state):
                 if e not in state.put:
@@ -361,6 +373,16 @@ class Search:
         """By how much a state is likelier than that nothing changed [nats]."""
         nothing = self.visited[frozenset()].reached
         return (state.reached - nothing) / ratio - told.price(state.put, state.sizes)
+
+    def nothing(self, told: Competition) -> float:
+        """Probability that nothing changed, beside all that was fitted.
+
+        Likelihoods count as much less as intervals are wider by what a model lacks elsewhere.
+        """
+        odds = [
+            self.over_nothing(s, told, told.width_of(s.put)) for s in self.visited.values() if s.put
+        ]
+        return float(scipy.special.expit(-scipy.special.logsumexp(odds))) if odds else 1.0
 
     def _best(self, told: Competition, state: Exact) -> Exact:
         """The state with most evidence, all that come close to it at their maxima."""
