@@ -103,6 +103,16 @@ def test_a_stiffness_that_would_be_seen_is_seen(truth: Model, before: Fit, offse
         assert ("tyre_front" in {e.id for e in change.named}) is named
 
 
+def test_of_tyres_what_is_known_is_printed(offset: Change) -> None:
+    """Coefficients with errors of many times their size told nothing, in half of each row."""
+    value, std, bound = (1.25, -0.2, -0.18, 0.0), (3.5, 0.7, 0.02, 9.0), (8.2, 1.6, 0.22, 17.6)
+    tyre = replace(offset["tyre_front"], value=value, std=std, bound=bound)
+    tyre = replace(tyre, stiffness=(-0.217, 0.0018))
+    assert tyre.size == "cornering stiffness -21.7 +- 0.18 %, D_front -0.18 +- 0.02"
+    assert replace(tyre, bound=(8.2, 1.6, 0.42, 17.6)).size == "cornering stiffness -21.7 +- 0.18 %"
+    assert set(tyre.to_dict()["change"]) == {"B_front", "C_front", "D_front", "E_front"}
+
+
 def test_more_than_all_of_a_stiffness_is_printed_as_a_number(offset: Change) -> None:
     """It was 1.5e+02 %."""
     tyre = replace(offset["tyre_front"], least_stiffness=1.517, said="not testable")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -85,12 +86,19 @@ class EffectChange:
 
     @property
     def size(self) -> str:
-        """The differences with standard errors, in words."""
+        """The differences with standard errors, in words.
+
+        Of tyres the stiffness, and those of B, C, D and E that are off nothing one by one: together
+        they may be known where none of them is.
+        """
         told = [_signed(v, s) for v, s in zip(self.value, self.std, strict=True)]
         if self.stiffness is None:
             return self._listed(told)
         value, std = (100.0 * x for x in self.stiffness)
-        return f"cornering stiffness {_signed(value, std)} %, {self._listed(told)}"
+        off = [b < 2.0 * abs(v) for v, b in zip(self.value, self.bound, strict=True)]
+        return ", ".join(
+            filter(None, (f"cornering stiffness {_signed(value, std)} %", self._listed(told, off)))
+        )
 
     @property
     def sure(self) -> str:
@@ -156,9 +164,9 @@ class EffectChange:
             },
         }
 
-    def _listed(self, figures: list[str]) -> str:
-        told = zip(self.names, figures, self.units, strict=True)
-        return ", ".join(f"{n} {x}{unit_after(u)}" for n, x, u in told)
+    def _listed(self, figures: Sequence[str], which: Sequence[bool] | None = None) -> str:
+        told = zip(self.names, figures, self.units, which or [True] * len(figures), strict=True)
+        return ", ".join(f"{n} {x}{unit_after(u)}" for n, x, u, shown in told if shown)
 
     def __str__(self) -> str:
         return f"{self.id}: {self.size}"
