@@ -2,30 +2,19 @@
 
 A kerb, a contact, a hand brake or a jump of a sensor leaves most of its error in less time than
 any disturbance that is learned may last. What a model lacks errs wherever it acts: of drives with a
-missing effect no second holds more than a part of the error. Three questions, of the second with
-the largest error above the noise floor:
-
-- Is its part of the squared error worth telling?
-- Does it hold more of what lies above the floor than all other driving together?
-- Is that more than chance? Forces that a model lacks grow with what the driver asks of the car.
-  Were these all, the energy of the error in second i would be exponential (two degrees of freedom)
-  with a mean in proportion to q_i, the energy of his commands there. One second w would then hold
-  r times what all others hold with probability prod_i 1 / (1 + r q_i / q_w); for equal q_i this is
-  Fisher's test of the largest share (Proc. R. Soc. A 125, 1929). It is added up over all places of
-  w. So a log of a single manoeuvre, with all of its error in that, has no event.
+missing effect no second holds more than a part of the error (`_common/moment.py`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from .._common.arrays import FloatArray, as_float64, filled
+from .._common.arrays import FloatArray, filled
+from .._common.moment import commands, moment_of
 from .._common.text import number
 from ..estimate import Driving
 from ..log import LEAST_STRETCH_S, Log
@@ -91,92 +80,33 @@ class Event:
         longest_s : float
             Of a moment: the longest that a disturbance may last.
         """
-        above = squares - count
-        held, span, window = max(_fullest(driving, above, longest_s), key=lambda w: w[0])
-        if not squares[window].sum() > USUAL.taken * squares.sum():
+        found = moment_of(
+            squares,
+            count,
+            _commands(driving),
+            driving.spans,
+            longest_s=longest_s,
+            least=USUAL.taken,
+            level=USUAL.level,
+        )
+        if found is None:
             return None
-        starts = _blocks(driving, longest_s)
-        elsewhere = np.maximum(_outside(above, window, starts), 0.0).sum()
-        if not held > elsewhere:
-            return None
-        energy = _commands(driving)
-        # What a car does now it was told up to a moment ago.
-        before = slice(max(2 * window.start - window.stop, span), window.stop)
-        with np.errstate(divide="ignore"):
-            odds = held / (elsewhere * energy[before].sum())
-        others = _outside(energy, window, starts)
-        chance = -np.log1p(odds * others[others > 0.0]).sum()
-        if not math.log(driving.samples) + chance <= math.log(USUAL.level):
-            return None
-        inside = _likeliest(driving, squares, count, window)
-        held = above[inside].sum()
-        elsewhere = np.maximum(_outside(above, inside, starts), 0.0).sum()
+        inside, share = found
         log = driving.logs[int(driving.log_number[inside.start])]
         time = driving.channel("time_s")[inside]
         return cls(
             log.name,
             float(time[0]),
             float(time[-1]),
-            float(held / (held + elsewhere)),
+            share,
             float(np.sqrt(squares[inside].sum() / count[inside].sum())),
             _remedy(log, *_told(float(time[0]), float(time[-1]))),
         )
 
 
-def _fullest(
-    driving: Driving, above: FloatArray, longest_s: float
-) -> Iterator[tuple[float, int, slice]]:
-    """In each stretch the window with the largest sum, that sum, and where the stretch begins."""
-    for first, end, rate in driving.spans:
-        width = min(_width(longest_s, rate), end - first)
-        sums = np.concatenate([[0.0], np.cumsum(above[first:end])])
-        sums = sums[width:] - sums[:-width]
-        at = first + int(np.argmax(sums))
-        yield float(sums.max()), first, slice(at, at + width)
-
-
-def _width(seconds: float, rate_hz: float) -> int:
-    return max(round(seconds * rate_hz), 1)
-
-
-def _blocks(driving: Driving, seconds: float) -> npt.NDArray[np.intp]:
-    """First samples of the blocks of that length of which each stretch consists."""
-    return np.concatenate(
-        [np.arange(first, end, _width(seconds, rate)) for first, end, rate in driving.spans]
-    )
-
-
-def _outside(values: FloatArray, window: slice, starts: npt.NDArray[np.intp]) -> FloatArray:
-    """Sums over blocks, without what lies in the window."""
-    values = values.copy()
-    values[window] = 0.0
-    return as_float64(np.add.reduceat(values, starts))
-
-
 def _commands(driving: Driving) -> FloatArray:
-    """Energy of what the driver asks of the car, sideways and along it, by sample.
-
-    Of commands, not of the motion: an event moves the car too. Both have the same weight.
-    """
     steer, along = driving.inputs().T
-    asked = (steer * filled(driving.channel("vx_mps")) ** 2, along)
-    energy = np.zeros(driving.samples)
-    for values in asked:
-        squares = (values - np.median(values)) ** 2
-        energy += squares / max(float(squares.sum()), 1e-300)
-    return energy
-
-
-def _likeliest(driving: Driving, squares: FloatArray, count: FloatArray, window: slice) -> slice:
-    """The likeliest samples, near a window, to have its mean square, and not that of the others."""
-    high = squares[window].sum() / count[window].sum()
-    low = (squares.sum() - squares[window].sum()) / (count.sum() - count[window].sum())
-    gain = (1.0 / low - 1.0 / high) * squares - np.log(high / low) * count
-    first, end = next((a, b) for a, b, _ in driving.spans if a <= window.start < b)
-    sums = np.concatenate([[0.0], np.cumsum(gain[first:end])])
-    stop = int(np.argmax(sums - np.minimum.accumulate(sums)))
-    begin = int(np.argmin(sums[:stop]))
-    return slice(first + begin, first + stop)
+    return commands(steer, filled(driving.channel("vx_mps")), along)
 
 
 def _told(begin: float, end: float) -> tuple[float, float]:

@@ -19,11 +19,12 @@ from ..vehicle import Vehicle
 from .condition import Conditioning
 from .faults import FALSE_CLAIMS, Rival, SensorFault, doubted, faults_of
 from .kinematics.equations import FAULTS, SLIPS, SWINGS, Readings
-from .kinematics.estimate import Estimate, estimate, noise_of, preferred
+from .kinematics.estimate import Estimate, estimate, misfit, noise_of, preferred
 from .kinematics.motion import Grid, Stretch
 from .kinematics.parts import cut
 from .kinematics.slip import with_slips
 from .kinematics.swing import swings_as, with_swings
+from .moments import Moment, measured, moments_of, without
 from .result import SensorCheck
 from .signals import MOVING, Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
 
@@ -32,6 +33,7 @@ _MEAN_S = 0.03  # quick channels enter as means over so long
 # places between the knots, a delay that moves them to better places would seem to be there.
 _STEP_MEANS = 2.3607
 _STEP_SAMPLES = 1.618  # of a channel that is slower than that
+_MOMENTS = 3  # that are left out
 _SEARCHES = 1  # for a better explanation, from one that does without a fault
 # Nats by which a body that swings or wheels that slip have to be likelier. By two parameters more a
 # likelihood gains as much by chance as often as a fault is claimed by chance.
@@ -85,7 +87,16 @@ def check(
     conditioning = Conditioning.of(together)
     ready = [conditioning.apply(log) for log in together]
     told = tuple(signal for log in together for signal in signals(log))
-    found = checked(ready, vehicle, seed=whole(seed, "seed"), told=told)
+    moments: list[Moment] = []
+    while True:
+        found = checked(ready, vehicle, seed=whole(seed, "seed"), told=told, moments=moments)
+        expected = {channel: of for channel, (_, of) in found.noise.items()}
+        more = moments_of(found.readings, expected, found.stretches, ready)
+        # What several channels feel at once is a blow: it is told once.
+        more = [m for m in more if not any(m.at_once_with(known) for known in moments)]
+        if not more or len(moments) == _MOMENTS:
+            break
+        moments.append(_contradicting(found, more))
     return replace(found, logs=tuple(together), conditioning=conditioning)
 
 
@@ -97,16 +108,19 @@ def checked(
     seed: int = 0,
     enough: Told = lambda *_: False,
     told: tuple[Signal, ...] | None = None,
+    moments: Sequence[Moment] = (),
 ) -> SensorCheck:
     """As `check` of logs whose noise is white, or no more than its first estimate.
 
     `told` are signals of the logs as they were read, by default of these. `enough` is asked with
     this estimate and the faults that it tells. Parts of the driving only take claims back;
     explanations without a fault do too, unless one of them is the better one. So do a body that
-    swings and wheels that slip: in the place of one fault, or of all, where that is likelier.
+    swings and wheels that slip: in the place of one fault, or of all, where that is likelier. What
+    `moments` hold is left out.
     """
     stretches = pieces(together)
-    readings = readings_of(together, stretches)
+    every = readings_of(together, stretches)
+    readings = without(every, stretches, moments)
     refuse_mixed_up(together, readings)
     have = {r.channel for r in readings}
     lacking = [c for c in MOVING if c not in have]
@@ -136,7 +150,7 @@ def checked(
     means = [averaged(r, _MEAN_S) for r in readings]
 
     def part(some: Sequence[Stretch]) -> list[Readings]:
-        own = _slipping(readings_of(together, some))
+        own = _slipping(without(readings_of(together, some), some, moments))
         swung = [swings_as(r, some, of, stretches) for r, of in zip(own, readings, strict=True)]
         return [averaged(r, _MEAN_S) for r in swung]
 
@@ -192,16 +206,28 @@ def checked(
                 if kind <= {*SLIPS} and not claimed.issuperset(f.name for f in left if f.found):
                     continue
                 lacks, found, faults = lacks - kind, instead, left
+    noise = noise_of(readings, found, floors)
     return SensorCheck(
         logs=tuple(together),
         faults=faults,
         signals=told,
         estimate=found,
-        noise=noise_of(readings, found, floors),
+        noise=noise,
         readings=tuple(readings),
         stretches=tuple(stretches),
         vehicle=vehicle,
+        moments=tuple(measured(m, every, stretches, found, noise) for m in moments),
     )
+
+
+def _contradicting(found: SensorCheck, moments: Sequence[Moment]) -> Moment:
+    """Of channels that contradict each other the one without which they do not."""
+
+    def left(moment: Moment) -> float:
+        kept = without(found.readings, found.stretches, [moment])
+        return misfit([averaged(r, _MEAN_S) for r in kept], found.estimate, found.estimate)
+
+    return min(moments, key=left) if len(moments) > 1 else moments[0]
 
 
 def _slipping(readings: Sequence[Readings]) -> list[Readings]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .._common.arrays import FloatArray
-from .._common.style import AFTER, MEASURED, axes_or_new, tidy
 from .._common.text import html_list, html_paragraph, html_table, number, text_table
 from ..effects import Effect
 from ..errors import InvalidInput, near_names
@@ -25,6 +22,8 @@ from .kinematics.colour import Colour
 from .kinematics.equations import Readings, lean
 from .kinematics.estimate import Estimate
 from .kinematics.motion import Stretch
+from .moments import Moment, left_out
+from .picture import drawn
 from .settled import narrowed, settled
 from .signals import MOVING, Signal
 from .texts import ON_CORRECTION, gradient, map_line, slips, swings
@@ -65,6 +64,8 @@ class SensorCheck:
     conditioning : Conditioning or None
         Low-passes of the sensors, and what takes them and vibration out; None where the logs had
         been freed of these.
+    moments : tuple of Moment
+        In which one channel contradicts the others; all else is told without its readings there.
     """
 
     logs: tuple[Log, ...]
@@ -76,6 +77,7 @@ class SensorCheck:
     stretches: tuple[Stretch, ...]
     vehicle: Vehicle | None = None
     conditioning: Conditioning | None = None
+    moments: tuple[Moment, ...] = ()
 
     @property
     def found(self) -> tuple[SensorFault, ...]:
@@ -159,12 +161,15 @@ class SensorCheck:
 
         Low-passes of the sensors and vibration are taken out, and time offsets, biases and scales
         (gravity by roll and pitch is one), and slip of wheels whose speed is logged; accelerations
-        are those of the speed sensor's place, in its direction. Where the delay of one speed was
+        are those of the speed sensor's place, in its direction. Moments in which a channel
+        contradicts the others are left out of it. Where the delay of one speed was
         found, a like one of the other is put right too. Faults that were not found are left alone;
         so is the steering angle. Where no wheel force is logged the measured a_x is what drives the
         car, and its mean beyond the motion is taken out: bias of the sensor and slope of the road
         are one there. That of a_y is left to the tyres, which can tell them.
         """
+        spared, said = left_out(log, self.logs, self.moments)
+        log = log.corrected(spared, said) if spared else log
         if self.conditioning is not None:
             log = self.conditioning.apply(log)
         channels, what = corrected(log, self._taken_out)
@@ -178,6 +183,7 @@ class SensorCheck:
     def remarks(self) -> tuple[str, ...]:
         """What follows from the faults and the noise, in sentences."""
         said = [] if self.conditioning is None else self.conditioning.remarks(self.logs)
+        said += map(str, self.moments)
         for axis, channel, name in (
             ("roll", "ay_mps2", "gain_ay"),
             ("pitch", "ax_mps2", "gain_ax"),
@@ -276,6 +282,10 @@ class SensorCheck:
         """One sentence."""
         names = ", ".join(log.name for log in self.logs)
         filtered = " Sensors have a low-pass." if self.low_passes else ""
+        if self.moments:
+            jumped = list(dict.fromkeys(m.channel for m in self.moments))
+            contradict = "contradicts" if len(jumped) == 1 else "contradict"
+            filtered += f" For a moment {' and '.join(jumped)} {contradict} the others."
         if len(self.found) == 1:
             return f"{names}: 1 sensor fault was found.{filtered}"
         if self.found:
@@ -286,6 +296,8 @@ class SensorCheck:
             return f"{names}: the sensors do not agree: {which}.{filtered}"
         if not self.estimate.settled:
             return f"{names}: no fault was found, but the sensors do not agree.{filtered}"
+        if self.moments:
+            return f"{names}: no fault that lasts was found.{filtered}"
         return f"{names}: the sensors agree; no fault was found.{filtered}"
 
     def __str__(self) -> str:
@@ -330,7 +342,7 @@ class SensorCheck:
     def plot(self, channel: str = "ay_mps2", ax: Axes | None = None) -> Axes:
         """Draw what a channel read, and what it should have read of the common motion.
 
-        Several logs stand side by side.
+        Several logs stand side by side; what was left out is shaded.
 
         Parameters
         ----------
@@ -343,22 +355,9 @@ class SensorCheck:
         -------
         matplotlib Axes
         """
-        time_s, values, expected = self.residuals(channel)
-        ax = axes_or_new(ax, 8.0, 2.6)
-        number_of = next(r.stretch for r in self.readings if r.channel == channel)
-        begins = np.cumsum([0.0, *(log["time_s"][-1] - log["time_s"][0] for log in self.logs)])
-        for k, stretch in enumerate(self.stretches):
-            at, log = number_of == k, stretch.log
-            shift = begins[log] - self.logs[log]["time_s"][0] if log else 0.0
-            (read,) = ax.plot(time_s[at] + shift, values[at], color=MEASURED, linewidth=0.6)
-            (of,) = ax.plot(time_s[at] + shift, expected[at], color=AFTER, linewidth=0.9)
-        for begin, later in zip(begins[1:], self.logs[1:], strict=False):
-            ax.axvline(begin, color="0.6", linewidth=0.8)
-            at, by = ("data", "axes fraction"), "offset points"
-            ax.annotate(later.name, (begin, 1.0), (3, -9), xycoords=at, textcoords=by)
-        ax.legend([read, of], ["read", "of the common motion"], fontsize="small")
-        along = "time_s" if len(self.logs) == 1 else "time_s, log after log"
-        return tidy(ax, xlabel=along, ylabel=channel)
+        expected = self.residuals(channel)[2]
+        (own,) = (r for r in self.readings if r.channel == channel)
+        return drawn(own, expected, self.stretches, self.logs, self.moments, ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Every figure, for JSON."""
@@ -384,6 +383,7 @@ class SensorCheck:
             },
             "low_passes": self.low_passes,
             "signals": [vars(s) for s in self.signals],
+            "moments": [asdict(m) for m in self.moments],
             "settles": list(self.settles),
             "channel_map": list(self.map_lines),
             "remarks": list(self.remarks),

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from ..._common.arrays import FloatArray
@@ -126,6 +127,12 @@ class Readings:
     values: FloatArray
     swings: FloatArray | None = None
     slips: FloatArray | None = None
+
+    def only(self, kept: npt.NDArray[np.bool_]) -> Readings:
+        """Some of the samples."""
+        swings, slips = (None if x is None else x[kept] for x in (self.swings, self.slips))
+        at, times, values = self.stretch[kept], self.time_s[kept], self.values[kept]
+        return Readings(self.channel, at, times, values, swings, slips)
 
 
 def predict(

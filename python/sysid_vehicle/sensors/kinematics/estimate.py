@@ -249,13 +249,12 @@ def preferred(readings: Sequence[Readings], one: Estimate, other: Estimate) -> f
         - costs[1]
         + 0.5
         * sum(
-            _misfit(readings, other, noise) - _misfit(readings, one, noise)
-            for noise in (one, other)
+            misfit(readings, other, noise) - misfit(readings, one, noise) for noise in (one, other)
         )
     )
 
 
-def _misfit(readings: Sequence[Readings], found: Estimate, noise: Estimate) -> float:
+def misfit(readings: Sequence[Readings], found: Estimate, noise: Estimate) -> float:
     """Half the squares of the errors and of the motion, the motion at its best."""
     runs = {r.channel: neighbours(r.stretch, r.time_s) for r in readings}
     rows = _rows(readings, found.grid, noise.road_mps2)
