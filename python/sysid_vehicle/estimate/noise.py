@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
@@ -117,9 +117,12 @@ class NoiseModel:
         least = _LEAST_DISTURBANCE * np.array([force, force, moment])
         return replace(self, disturbance=tuple(map(float, np.maximum(self.disturbance, least))))
 
-    def __str__(self) -> str:
+    def text(self, measured: Container[str] = MEASURED) -> str:
+        """In words; of sensors that there are not it has a number that means nothing."""
         lines = [
-            f"  {c:15s} {s:10.3g} {UNITS[c]}" for c, s in zip(MEASURED, self.sensor, strict=True)
+            f"  {c:15s} {s:10.3g} {UNITS[c]}"
+            for c, s in zip(MEASURED, self.sensor, strict=True)
+            if c in measured
         ]
         force_x, force_y, moment = self.disturbance
         lines.append(
@@ -133,6 +136,9 @@ class NoiseModel:
                 f"deviations), correlation time {self.road_time_s:.2g} s"
             )
         return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return self.text()
 
     @property
     def times(self) -> str:

@@ -12,7 +12,16 @@ import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
 from .._common.tables import frame
-from .._common.text import HALF_95, brief, html_list, html_paragraph, html_table, number, text_table
+from .._common.text import (
+    HALF_95,
+    brief,
+    html_list,
+    html_paragraph,
+    html_table,
+    html_text,
+    number,
+    text_table,
+)
 from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
@@ -268,10 +277,13 @@ class Fit(Estimated):
         """As it prints, with `told` in place of the estimates and what follows from them."""
         table = text_table(self._head, self._rows(told))
         lines = [self._headline(), table, *self._warnings(), *self._by_log()]
-        return "\n".join([*lines, "Noise", str(self.noise)])
+        return "\n".join([*lines, "Noise", self._noise()])
 
     def __str__(self) -> str:
         return self.text()
+
+    def _noise(self) -> str:
+        return self.noise.text(self.driving.present)
 
     def _warnings(self) -> list[str]:
         return [f"Warning: {against}" for against in self.against_priors]
@@ -291,5 +303,5 @@ class Fit(Estimated):
             + html_table(self._head, self._rows())
             + (html_list(self._warnings()) if self.against_priors else "")
             + (html_list(self._by_log()) if self.driving.offsets else "")
-            + self.noise._repr_html_()
+            + html_text(self._noise())
         )

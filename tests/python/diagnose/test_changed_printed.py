@@ -53,6 +53,11 @@ def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
     assert "something changed, likeliest steer_offset (80 % sure)" in text
     assert "likely, but not shown: offset_rad below 0.00" in text
     assert contradictions_of_changes(text) == []
+    far = replace(offset.effects[0], said="implausible", probability=0.99)
+    change = replace(offset, effects=(far, *offset.effects[1:]))
+    assert str(change).startswith("something changed, and what explains it is not shown: steer_off")
+    assert not change.calm
+    assert contradictions_of_changes(str(change)) == []
     calm = replace(likely, said="not testable", probability=None)
     text = str(replace(offset, effects=(calm,)))
     assert text.startswith("no change is shown\n")

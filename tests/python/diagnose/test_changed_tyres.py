@@ -6,10 +6,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from sysid_vehicle import Model, changed, drive, identify, manoeuvres
+from sysid_vehicle import Fit, Model, Tyre, changed, drive, identify, manoeuvres
 from sysid_vehicle.diagnose.change.may_change import beyond, forces_of_tyre, of_tyre, room
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
+from sysid_vehicle.diagnose.changed import _later
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.tyre import magic_formula
 
@@ -58,6 +60,53 @@ def test_errors_of_a_tyre_are_those_of_its_force(truth: Model) -> None:
     share, std = change["tyre_rear"].stiffness or (0.0, np.inf)
     assert share == pytest.approx(-0.2, abs=3.0 * std)
     assert std < 0.01
+
+
+@pytest.fixture(scope="module")
+def gentle(truth: Model) -> Fit:
+    """Of gentle driving, which tells the stiffness of tyres and none of their coefficients."""
+    usual = truth.vehicle.replace(tyre_front=Tyre(), tyre_rear=Tyre())
+    log = drive(truth, manoeuvres.lap(20.0, lateral_mps2=4.0), seed=31, rate_hz=25.0)
+    return identify(Model(usual), log, starts=1)
+
+
+def gently_later(truth: Model, fit: Fit, rear: float) -> Saying:
+    """Other such driving, with the rear tyres' B multiplied."""
+    car = truth.with_values({"B_rear": rear * truth.value("B_rear")})
+    log = drive(car, manoeuvres.lap(20.0, lateral_mps2=4.0), seed=32, rate_hz=25.0)
+    few = ("steer_ratio",)
+    return Saying(Search(fit, _later(fit, Driving.of(log), None), few, USUAL))
+
+
+def test_tyres_that_did_not_change_have_errors_of_their_stiffness_too(
+    truth: Model, gentle: Fit
+) -> None:
+    """Together with later driving they are fitted elsewhere in the valley of coefficients."""
+    change = gently_later(truth, gentle, 1.0).change()
+    assert change.calm
+    for axle in ("front", "rear"):
+        assert gentle[f"C_{axle}"].note == "not determined"
+        known = gentle[f"cornering stiffness {axle}"]
+        share, std = change[f"tyre_{axle}"].stiffness or (0.0, np.inf)
+        assert std < 2.0 * known.std / known.value
+        assert abs(share) < 3.0 * std
+        assert (change[f"tyre_{axle}"].least_stiffness or np.inf) < 0.1
+
+
+def test_what_tyres_can_be_is_asked_of_their_stiffness(truth: Model, gentle: Fit) -> None:
+    """A coefficient may go far along its valley, and no line tells how far it may."""
+    said = gently_later(truth, gentle, 0.7)
+    assert said.state.put == ("tyre_rear",)
+    B, C, D = (gentle.model.value(f"{n}_rear") for n in "BCD")
+    along = {"B_rear": -0.05 * B, "C_rear": C, "D_rear": (0.7 / 0.95 / 2.0 - 1.0) * D}
+    causes = said.change().causes
+    m, (sizes, stds) = said.search.can["tyre_rear"], said._told_sizes([], said.state)
+    stds |= dict.fromkeys(along, 1e-3)
+    found = said._of(m, causes, {**sizes, **along}, stds, said.told, calm=False)
+    assert found.said == "changed"
+    assert found.stiffness is not None
+    assert found.stiffness[0] == pytest.approx(-0.3, abs=1e-6)
+    assert not said._can_be(m, (2.0, 0.01))
 
 
 def test_no_line_is_followed_beyond_what_a_tyre_can_be(truth: Model) -> None:

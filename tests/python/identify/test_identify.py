@@ -216,6 +216,8 @@ def test_an_absent_lateral_speed_is_no_obstacle(
     assert "vy_mps" in blind.missing()
     found = identify(start, blind, starts=1)
     assert found.driving.present == ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+    # Nor is a noise told of what nobody measured.
+    assert all("vy_mps" not in told for told in (str(found), found._repr_html_()))
     assert_stiffness_found(found, car)
 
 

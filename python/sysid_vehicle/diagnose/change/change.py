@@ -77,7 +77,7 @@ class Change(Printed):
     def calm(self) -> bool:
         """Whether no change is shown, and none is likely."""
         told = bool(self.named or self.unknown)
-        return not told and not any(e.said == "likely" for e in self.effects)
+        return not told and not any(e.said in ("likely", "implausible") for e in self.effects)
 
     @property
     def load(self) -> LoadChange | None:
@@ -113,6 +113,12 @@ class Change(Printed):
         if likely:
             return (
                 f"no single change is significant; something changed, likeliest {', '.join(likely)}"
+            )
+        beyond = [f"{e} ({e.sure})" for e in self.effects if e.said == "implausible"]
+        if beyond:
+            return (
+                f"something changed, and what explains it is not shown: {'; '.join(beyond)} "
+                "fits best, and is larger than on any car"
             )
         return "no change is shown"
 

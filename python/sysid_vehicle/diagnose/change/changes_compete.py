@@ -212,11 +212,8 @@ class Competition:
         changes : mapping of str to float
             What is taken off before the colour of residuals is asked for.
         """
-        beside = [p for p in self.put if p != effect and self._alike[effect, p] < self._rules.near]
-        both, inverse = self._solved([*beside, effect])
-        later, shared = np.zeros((2, len(self._turns)))
-        at = [self._place[n] for n in self._of(effect).names]
-        later[at], shared[at] = slopes[0], slopes[0] + slopes[1]
+        both, inverse = self._usual(effect)
+        later, shared = self._slopes(effect, slopes)
         by_changes, rest = self._differences.of_both(later, shared)
         slope = (self._turns.T @ by_changes)[both]
         variance = float(slope @ inverse @ slope)
@@ -230,6 +227,44 @@ class Competition:
             off[list(columns), 0] = [changes.get(n, 0.0) for n in self._of(name).names]
         turned = (self._turns @ x for x in (along, off, of))
         return float(np.sqrt((variance + rest) * self._differences.ratios(*turned)[1][0]))
+
+    def beside(self, effect: str) -> dict[str, float]:
+        """Sizes of an effect that was not put in, as `std_along` takes it, and of what was."""
+        both, inverse = self._usual(effect)
+        found = dict(zip(both, inverse @ self._score[both], strict=True))
+        return {
+            n: float(found[c])
+            for name in self._beside(effect)
+            for n, c in zip(self._of(name).names, self._whole[name].columns, strict=True)
+        }
+
+    def _usual(self, effect: str) -> tuple[list[int], FloatArray]:
+        """As `_solved`; an effect that was not put in is about as large as usual, or nothing.
+
+        Directions that no driving tells would lead further than lines hold.
+        """
+        both, inverse = self._solved(self._beside(effect))
+        if effect in self.put:
+            return both, inverse
+        own = [both.index(c) for c in self._whole[effect].columns]
+        known = self._information[np.ix_(both, both)].copy()
+        known[own, own] += self._scale[[both[i] for i in own]] ** -2.0
+        return both, pseudo_inverse(known)[0]
+
+    def _beside(self, effect: str) -> list[str]:
+        """The effect, after what was put in; beside what acts like it if that alone was put in."""
+        own = effect in self.put
+        near = [p for p in self.put if own and self._alike[effect, p] >= self._rules.near]
+        return [*(p for p in self.put if p != effect and p not in near), effect]
+
+    def _slopes(
+        self, effect: str, slopes: tuple[FloatArray, FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Derivatives by all changes, and by all that both drivings share."""
+        later, shared = np.zeros((2, len(self._turns)))
+        at = [self._place[n] for n in self._of(effect).names]
+        later[at], shared[at] = slopes[0], slopes[0] + slopes[1]
+        return later, shared
 
     def off_nothing(self, effects: Sequence[str], changes: Mapping[str, float]) -> float:
         """Of what was put in as one change, the p-value of nothing by lines, beside the others.

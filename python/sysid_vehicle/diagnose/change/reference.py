@@ -137,11 +137,15 @@ class Reference:
         several = (*self.effects, *SCALINGS)
         return next(e.named[name].null_value for e in several if name in e.named)
 
+    def own(self, state: Exact, name: str) -> float:
+        """The same in the reference, fitted as some state is."""
+        model = self._fitted[frozenset(state.put)][0]
+        return model.value(name) if name in model.parameters else self.value(name)
+
     def factors(self, state: Exact) -> dict[str, float]:
         """What relative errors multiply by in the reference, fitted as some state is."""
-        own = self._fitted[frozenset(state.put)][0]
-        values = {n: own.value(n) if n in own.parameters else self.value(n) for n in self.names}
-        return {n: 1.0 + v for n, v in values.items() if n.endswith(OF_A_FACTOR)}
+        names = (n for n in self.names if n.endswith(OF_A_FACTOR))
+        return {n: 1.0 + self.own(state, n) for n in names}
 
     def fitted(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -30,6 +31,11 @@ class Saying:
     def __init__(self, search: Search) -> None:
         self.search = search
         self.told, self.state = search.found()
+
+    @cached_property
+    def at_one_point(self) -> Competition:
+        """Of tyres that did not change: their coefficients lie in a bent valley."""
+        return self.search.told(self.state, at_one_point=True)
 
     def change(self) -> Change:
         """Exact likelihoods decide on what was put in, scores on all else.
@@ -260,7 +266,9 @@ class Saying:
             for s, usual, w, (low, high) in zip(std, m.scale, matters, ends, strict=True)
         )
         small = all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True))
-        said, group = self._verdict(m, causes, can_be=possible(m, *raw, rules), small=small)
+        stiffness = self._stiffness(m, told_by, cut)
+        can_be = possible(m, *raw, rules) if stiffness is None else self._can_be(m, stiffness)
+        said, group = self._verdict(m, causes, can_be=can_be, small=small)
         if said == "not testable":
             if all(b < w for b, w in zip(bound, matters, strict=True)):
                 said = "unchanged"
@@ -269,7 +277,6 @@ class Saying:
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
         # Of what driving does not tell, its line has a probability that says nothing.
         sure = None if said in ("unchanged", "not testable") else causes.inclusion.get(m.id, 0.0)
-        stiffness = self._stiffness(m, told_by, cut)
         least_stiffness = None if stiffness is None else self._least_stiffness(m, stiffness[1])
         figures = (value, std, bound, sure, said, group, least, stiffness, least_stiffness)
         return EffectChange(m.id, names, units, *figures)
@@ -289,11 +296,21 @@ class Saying:
             return "negligible", ()
         return ("one of a group" if group else "changed"), group
 
+    def _usual_share(self, m: May) -> float:
+        """Of tyres, by which share their cornering stiffness usually changes."""
+        before = [self.search.before.model.value(n) for n in m.names[:3]]  # B, C, D
+        return float(np.linalg.norm(np.array(m.scale[:3]) / before))
+
+    def _can_be(self, m: May, stiffness: tuple[float, float]) -> bool:
+        """Whether tyres can change so: one by one their coefficients, in their valley, tell not."""
+        share, std = stiffness
+        rules = self.search.rules
+        return abs(share) - rules.interval * std <= rules.implausible * self._usual_share(m)
+
     def _least_stiffness(self, m: May, std: float) -> float:
         """Of tyres, the smallest share of their cornering stiffness that would be named."""
-        before = [self.search.before.model.value(n) for n in m.names[:3]]  # B, C, D
-        usual = float(np.linalg.norm(np.array(m.scale[:3]) / before))
-        return self.told.least(std, usual, self.told.price([m.id], dict.fromkeys(m.names, 0.0)))
+        price = self.told.price([m.id], dict.fromkeys(m.names, 0.0))
+        return self.told.least(std, self._usual_share(m), price)
 
     def _stiffness(self, m: May, sizes: Sequence[float], cut: float) -> tuple[float, float] | None:
         """By which share the cornering stiffness of an axle's tyres differs, per load, +- what.
@@ -302,13 +319,19 @@ class Saying:
         """
         if m not in self.search.tyres:
             return None
-        before = np.array([self.search.before.model.value(n) for n in m.names[:3]])  # B, C, D
         put = m.id in self.state.put
+        told = self.told if put else self.at_one_point
+        model = self.search.before.model if put else self.state.searched
+        before = np.array([model.value(n) for n in m.names[:3]])  # B, C, D
         after = before + np.array(sizes[:3]) if put else before
         ratio = float(np.prod(after) / np.prod(before))
         later = as_float64([*(ratio / after), 0.0])
         earlier = as_float64([*(-ratio / before), 0.0])
-        value = ratio - 1.0 if put else float(later[:3] @ np.array(sizes[:3]))
-        known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
-        std = self.told.std_along(m.id, (later, earlier), known)
+        if put:
+            known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
+            value = ratio - 1.0
+        else:
+            known = told.beside(m.id)
+            value = (1.0 - cut) * float(later @ [known[n] for n in m.names])
+        std = told.std_along(m.id, (later, earlier), known)
         return value, max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)

@@ -30,6 +30,7 @@ from .may_change import (
     of_inertia,
     of_tyre,
 )
+from .one_point import Lines
 from .pieces import Pieces
 from .reference import Exact, Reference
 
@@ -289,18 +290,22 @@ class Search:
         )
         return [e for e in dict.fromkeys(several) if e in self.can and e not in told.put]
 
-    def told(self, state: Exact) -> Competition:
+    def told(self, state: Exact, *, at_one_point: bool = False) -> Competition:
         """What competes beside what was put in."""
         reference, side = self.reference, self.reference.side
         multiplied = factors(state.searched)
         names, effects = reference.names, reference.effects
         later = Side(state.fit, names, effects, like=side, factors=multiplied)
+        lines = Lines(side, state.shift, reference.shared)
         if self.start.model.vehicle != self.before.model.vehicle:
             # What both share is told in terms of the vehicle file of the later driving.
             same = replace(self.before, model=without(state.searched))
             side = Side(same, names, effects, like=side, residuals_of=side)
+            lines = replace(lines, side=side)
+        elif at_one_point:
+            lines = Lines.at_one_point(reference, state)
         differences = Differences(
-            side, later, state.shift, reference.shared, self._pieces, self.alike.unlike
+            lines.side, later, lines.shift, lines.known, self._pieces, self.alike.unlike
         )
         return Competition(
             differences,
