@@ -1,7 +1,8 @@
 """Outputs stored in the notebooks: made anew, or compared with those of a run.
 
-    python notebooks/outputs.py refresh [NOTEBOOK...]    execute, store outputs in small
-    python notebooks/outputs.py check [--strict] FOLDER  stored outputs against executed ones
+    python notebooks/outputs.py refresh [NOTEBOOK...]       execute, store outputs in small
+    python notebooks/outputs.py execute FOLDER NOTEBOOK...  execute, write into a folder
+    python notebooks/outputs.py check [--strict] FOLDER     stored outputs against executed ones
 
 What is compared is text: printed lines, tables and values. The words have to be the same. Numbers
 that differ by more than 5 % and two of their last printed digit are listed, and fail a strict check
@@ -53,7 +54,7 @@ def execute(path: Path) -> Notebook:
     book = nbformat.read(path, as_version=4)
     first = f"%config InlineBackend.rc = {{'figure.dpi': {DPI}}}"
     book.cells.insert(0, nbformat.v4.new_code_cell(first))
-    NotebookClient(book, timeout=900, kernel_name="python3").execute()
+    NotebookClient(book, timeout=300, kernel_name="python3").execute()
     del book.cells[0]
     stored: Notebook = json.loads(nbformat.writes(book))
     return stored
@@ -95,6 +96,14 @@ def refresh(paths: list[Path]) -> int:
         text = json.dumps(book, indent=1, ensure_ascii=False) + "\n"
         path.write_text(text, encoding="utf-8")
         print(f"{path.name}: {len(text) / 1024:.0f} kB", flush=True)
+    return 0
+
+
+def written(paths: list[Path], folder: Path) -> int:
+    """Execute notebooks, and write them with what comes out."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in paths:
+        (folder / path.name).write_text(json.dumps(execute(path)), encoding="utf-8")
     return 0
 
 
@@ -169,12 +178,17 @@ def main() -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     again = commands.add_parser("refresh", help="execute notebooks and store their outputs")
     again.add_argument("notebooks", nargs="*")
+    beside = commands.add_parser("execute", help="execute notebooks and write them into a folder")
+    beside.add_argument("folder", type=Path)
+    beside.add_argument("notebooks", nargs="+")
     against = commands.add_parser("check", help="compare stored outputs with executed notebooks")
     against.add_argument("folder", type=Path)
     against.add_argument("--strict", action="store_true", help="numbers count too")
     told = parser.parse_args()
     if told.command == "refresh":
         return refresh(notebooks(told.notebooks))
+    if told.command == "execute":
+        return written(notebooks(told.notebooks), told.folder)
     return check(told.folder, told.strict)
 
 
