@@ -13,14 +13,19 @@ holds more than half of the squared error above the noise floor, and those of th
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 import sysid_vehicle as sv
 from sysid_vehicle.manoeuvres import Manoeuvre
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "exam"))
+import truths
 
 _LATERAL_N, _PUSH_S = 2500.0, 0.3  # a contact from the side
 _BRAKED, _BRAKED_S = 0.35, 0.5  # rear wheels that a hand brake holds, share of their side force
@@ -29,21 +34,6 @@ _KINDS = {"hand brake": _BRAKED_S, "push": _PUSH_S, "jump": _JUMP_S, "none": 0.0
 _HALF = 0.5
 _COLUMNS = ("drives", "told", "most", "told of these")
 
-_HATCHBACK = sv.Vehicle(
-    name="hatchback",
-    mass_kg=1080.0,
-    yaw_inertia_kgm2=1480.0,
-    lf_m=1.0,
-    lr_m=1.5,
-    cg_height_m=0.53,
-    track_front_m=1.48,
-    track_rear_m=1.47,
-    drag_area_m2=0.68,
-    brake_front_share=0.72,
-    drive_front_share=1.0,
-    tyre_front=sv.Tyre(B=9.0, C=1.35, D=1.02, E=0.0),
-    tyre_rear=sv.Tyre(B=11.0, C=1.35, D=1.05, E=-0.1),
-)
 _ROAD = {"fx_n": 120.0, "fy_n": 150.0, "mz_nm": 150.0, "correlation_time_s": 0.3}
 
 _EVEN = {"fx_n": 0.0, "fy_n": 0.0, "mz_nm": 0.0}
@@ -122,7 +112,7 @@ class Drive:
 
 
 def drawn(rng: np.random.Generator) -> Drive:
-    model = sv.Model((sv.example_vehicle(), _HATCHBACK)[int(rng.integers(2))])
+    model = sv.Model(truths.vehicle(("saloon", "hatchback")[int(rng.integers(2))]))
     effects = [e for e in sv.effects.catalogue() if e.id != "hand_brake"]
     lacked = [effects[i] for i in rng.choice(len(effects), int(rng.integers(3)), replace=False)]
     severity, values = float(rng.choice([0.5, 1.0, 2.0])), {}

@@ -67,9 +67,9 @@ def test_what_the_reference_alone_shows_to_be_missing_is_put_in(truth: Model) ->
     assert abs(change["steer_delay"].value[0] - 0.05) < 3.0 * change["steer_delay"].std[0]
 
 
-@pytest.mark.parametrize("something", [0.0, 0.5])
+@pytest.mark.parametrize("nothing", [0.0, 0.5])
 def test_it_is_asked_for_before_the_search_where_something_changed(
-    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, something: float
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, nothing: float
 ) -> None:
     """Beside what is lacked the search goes astray, for many times as long."""
     before = identify(start, drive(truth, manoeuvres.lap(10.0), seed=3, rate_hz=50.0), starts=1)
@@ -84,15 +84,15 @@ def test_it_is_asked_for_before_the_search_where_something_changed(
             asked.append(f"search {search.before.model.effects}")
             super().__init__(search)
 
-    monkeypatch.setattr(Search, "nothing", lambda *_: something)
+    monkeypatch.setattr(Search, "nothing", lambda *_: nothing)
     monkeypatch.setattr(module, "_named_in", shows)
     monkeypatch.setattr(module, "Saying", Asked)
     change = changed(before, before.driving.logs[0], candidates=("steer_ratio",))
     # Nothing changed in the same log: the search alone finds that, and nothing is asked.
     full = (DOWNFORCE,)
     told = [f"alone {()}", f"alone {full}", f"search {full}"]
-    assert asked == ([f"search {()}"] if something else told)
-    assert change.lacks == (() if something else full)
+    assert asked == ([f"search {()}"] if nothing else told)
+    assert change.lacks == (() if nothing else full)
 
 
 @pytest.mark.parametrize("calm", [False, True])
