@@ -30,12 +30,14 @@ LEVEL = HALF_95
 """Root of the 95 % quantile of chi-square with one degree of freedom."""
 
 _CLOSE = 0.04  # of the level
-_POINTS = 14  # on each side
+_POINTS = 20  # on each side
+_ASTRAY = 4.0  # of the level
 _ROUNDS = 20
 _ENOUGH = 0.01  # nats
 _STIFF = 30.0  # how much harder the wish pulls than the data
 _BETTER = 0.1  # nats
 _STEP = 3.0  # most by which the distance grows from one point to the next
+_AIMED = 4  # times
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +137,7 @@ class Optimum:
 
     def across(self, what: Quantity) -> tuple[FloatArray, float]:
         """Covariance of the free parameters with a quantity, and its variance."""
-        gradient = np.nan_to_num(what.slope(self.p)[self.box.columns])
+        gradient = _felt(what, self.p)[self.box.columns]
         across = self.covariance @ gradient
         return as_float64(across), float(gradient @ across)
 
@@ -221,16 +223,24 @@ def _side(at: Optimum, what: Quantity, sign: float) -> _Side:
     if furthest <= 1e-9 * max(abs(centre), 1.0):
         return side
     distance = min(LEVEL * std, furthest)
-    inside, outside = (0.0, 0.0, at.p), (np.inf, np.inf)
+    inside, outside, longest = (0.0, 0.0, at.p), (np.inf, np.inf), np.inf  # longest step
+    along = across / variance / box.units(at.p[box.columns])
     for _ in range(_POINTS):
-        start = _moved(inside[2], box, across * (sign * (distance - inside[0]) / variance))
+        start = _moved(inside[2], box, along, what, centre + sign * distance)
         there, loss = _pinned(at, start, what, centre + sign * distance, std)
         if loss < -_BETTER:
             return replace(side, better=there)
-        distance = sign * (what.of(there) - centre)
+        step, distance = distance - inside[0], sign * (what.of(there) - centre)
         if not np.isfinite(loss) or not np.isfinite(distance) or distance <= 0.0:
             break
         root = np.sqrt(2.0 * max(loss, 0.0))
+        if root > _ASTRAY * LEVEL:
+            # The search may have lost the valley: what it found says nothing of this value.
+            longest = 0.5 * step
+            if longest < _CLOSE * inside[0]:
+                return replace(side, end=centre + sign * inside[0], unbounded=False)
+            distance = inside[0] + longest
+            continue
         side.values.append(centre + sign * distance)
         side.lost.append(max(loss, 0.0))
         if abs(root - LEVEL) < _CLOSE * LEVEL:
@@ -240,12 +250,16 @@ def _side(at: Optimum, what: Quantity, sign: float) -> _Side:
         if root < LEVEL:
             if distance <= inside[0]:
                 break  # the wish is not heard any more
+            # From here on the valley goes on as it came.
+            came = box.apart(inside[2][box.columns], there[box.columns])
+            along = came / (sign * (distance - inside[0]))
             inside = (distance, root, there)
+            longest *= 2.0
             if distance >= furthest * (1.0 - 1e-9):
                 break
         else:
             outside = (distance, root)
-        distance = min(_next(inside, outside), furthest)
+        distance = min(_next(inside, outside), inside[0] + longest, furthest)
     if np.isfinite(outside[0]):
         end = np.interp(LEVEL, [inside[1], outside[1]], [inside[0], outside[0]])
         return replace(side, end=centre + sign * float(end), unbounded=False)
@@ -257,13 +271,43 @@ def lost_at(at: Optimum, what: Quantity, value: float) -> float:
     across, variance = at.across(what)
     if not (np.isfinite(variance) and variance > 0.0):
         return np.inf
-    start = _moved(at.p, at.box, across * ((value - what.of(at.p)) / variance))
+    along = across / variance / at.box.units(at.p[at.box.columns])
+    start = _moved(at.p, at.box, along, what, value)
     return _pinned(at, start, what, value, float(np.sqrt(variance)))[1]
 
 
-def _moved(p: FloatArray, box: Box, step: FloatArray) -> FloatArray:
-    """From a point that is known, along the direction that costs least."""
-    return box.inside(box.put(p, p[box.columns] + step))
+def _felt(what: Quantity, p: FloatArray) -> FloatArray:
+    """Gradient of a quantity by what moves it smoothly.
+
+    The slip at the peak changes infinitely fast where E loses the peak: there the others move it.
+    """
+    slope = what.slope(p)
+    return as_float64(np.where(np.isfinite(slope), slope, 0.0))
+
+
+def _moved(
+    p: FloatArray, box: Box, along: FloatArray, what: Quantity, target: float
+) -> FloatArray:
+    """From a point that is known, along the direction that costs least, to a quantity's target.
+
+    On the parameters' scales: where B, C and D move by shares B C D stays what it is, which a
+    straight line leaves.
+
+    Parameters
+    ----------
+    along : array, shape (free parameters,)
+        Change of the free parameters, on their scales, with the quantity.
+    """
+    x, now = p[box.columns], what.of(p)
+    step = along * (target - now)
+    there = p
+    for _ in range(_AIMED):
+        there = box.put(p, box.moved(x, step))
+        reached = what.of(there) - now
+        if not (np.isfinite(reached) and reached * (target - now) > 0.0):
+            break
+        step = step * min((target - now) / reached, _STEP)
+    return there
 
 
 def _next(inside: tuple[float, float, FloatArray], outside: tuple[float, float]) -> float:
@@ -291,7 +335,7 @@ def _pinned(
 
     def wish(p: FloatArray) -> tuple[FloatArray, FloatArray]:
         error = np.array([weight * (target - what.of(p))])
-        return error, weight * np.nan_to_num(what.slope(p))[None, :]
+        return error, weight * _felt(what, p)[None, :]
 
     there = at.bottom(at.objective.also(wish), start, box)
     return there, at.cost_of(there) - at.cost

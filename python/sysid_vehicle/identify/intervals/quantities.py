@@ -22,7 +22,7 @@ class Quantity:
     of : callable
         From all parameters to the value.
     slope : callable
-        From all parameters to its gradient; NaN where it has none.
+        From all parameters to its gradient; NaN or infinite where it has none.
     column : int, optional
         The parameter that it is.
     """

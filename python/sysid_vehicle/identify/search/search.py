@@ -59,6 +59,12 @@ class Box:
         there = np.where(positive, x * np.exp(np.where(positive, step, 0.0)), x + step)
         return as_float64(np.clip(there, self.lower, self.upper))
 
+    def apart(self, x: FloatArray, other: FloatArray) -> FloatArray:
+        """The step, on the scales of the free parameters, from one point to another."""
+        positive = self.positive
+        ratio = np.divide(other, x, out=np.ones_like(x), where=positive)
+        return as_float64(np.where(positive, np.log(ratio), other - x))
+
     def near(self, p: FloatArray, other: FloatArray, share: float) -> bool:
         """Whether the free ones of two sets of all parameters differ by less of the box."""
         return bool(np.all(np.abs(p - other)[self.columns] < share * self.width))
