@@ -13,7 +13,7 @@ from .._common.arrays import FloatArray, as_float64
 from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
-from ..log import Log
+from ..log import Log, check_car
 from ..tyre import Tyre
 from ..vehicle import Vehicle, vehicle_data
 from .sideslip_results import SideslipRun, judged, judged_by
@@ -259,7 +259,8 @@ def estimate_sideslip(
     Raises
     ------
     InvalidInput
-        If a channel is absent or the kind is not known.
+        If a channel is absent, the kind is not known, or wheel force or steering angle are not
+        those of a car of this mass and wheelbase.
     NumericalError
         If the filter leaves the range of numbers; the message gives the sample.
 
@@ -269,6 +270,7 @@ def estimate_sideslip(
         If the car is too slow for the observer all the time, or the tyres of the vehicle file do
         not fit the drive.
     """
+    check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
     settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
     run = run_over(log, SideslipObserver(vehicle, settings, kind), settings)
     if kind == "dual" or not judge or run.too_slow:

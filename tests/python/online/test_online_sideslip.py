@@ -175,6 +175,12 @@ def test_what_cannot_be_is_refused(vehicle, log):
         observer.run(np.ones(3), np.zeros((3, 4)))
 
 
+def test_a_log_of_another_car_is_refused(vehicle, log):
+    pounds = vehicle.replace(mass_kg=vehicle.mass_kg / 0.45359237)
+    with pytest.raises(InvalidInput, match="mass_kg seems to be in pounds"):
+        estimate_sideslip(pounds, log)
+
+
 def test_least_squares_find_the_stiffness_behind_exact_readings(vehicle):
     rng = np.random.default_rng(0)
     alpha = 0.02 * rng.standard_normal((500, 2))
