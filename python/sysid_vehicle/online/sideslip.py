@@ -16,7 +16,7 @@ from ..estimate.inputs import white_noise_std
 from ..log import Log, check_car
 from ..tyre import Tyre
 from ..vehicle import Vehicle, vehicle_data
-from .sideslip_results import SideslipRun, judged, judged_by
+from .sideslip_results import SideslipRun, doubted, judged, judged_by
 from .sideslip_settings import NOISE_BLOCK, SideslipSettings
 
 #: Kinds of observers, with what each is.
@@ -267,12 +267,14 @@ def estimate_sideslip(
     Warns
     -----
     SysidWarning
-        If the car is too slow for the observer all the time, or the tyres of the vehicle file do
-        not fit the drive.
+        If the car is too slow for the observer all the time, the tyres of the vehicle file do not
+        fit the drive, or the dual observer has learnt far softer ones.
     """
     check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
     settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
     run = run_over(log, SideslipObserver(vehicle, settings, kind), settings)
+    if kind == "dual":
+        doubted(run, static_stiffness(vehicle))
     if kind == "dual" or not judge or run.too_slow:
         return run
     return judged_by(run, run_over(log, SideslipObserver(vehicle, settings), settings))

@@ -181,6 +181,34 @@ def test_a_log_of_another_car_is_refused(vehicle, log):
         estimate_sideslip(pounds, log)
 
 
+def on_ice(vehicle):
+    """The car with a seventh of its friction, and a quarter of its cornering stiffness."""
+    tyres = {
+        axle: getattr(vehicle, axle).replace(
+            D=0.15 * getattr(vehicle, axle).D, B=1.6 * getattr(vehicle, axle).B
+        )
+        for axle in ("tyre_front", "tyre_rear")
+    }
+    return vehicle.replace(**tyres)
+
+
+def test_on_ice_with_tyres_of_a_dry_road_nobody_is_told_that_the_friction_is_known(vehicle):
+    slippery = on_ice(vehicle)
+    most = 0.8 * sv.manoeuvres.peak_lateral_mps2(slippery)
+    slow = sv.manoeuvres.Knots((0.0, 30.0, 60.0), (10.0, 13.0, 11.0))  # braked by the ice alone
+    lap = dataclasses.replace(sv.manoeuvres.lap(60.0, most, 14.0), speed_mps=slow)
+    log = sv.drive(sv.Model(slippery), lap, seed=255841, rate_hz=50.0)
+    with pytest.warns(SysidWarning, match=r"the cornering stiffness is 0\.2\d .* ice or snow"):
+        run = estimate_sideslip(vehicle, log)
+    assert run.mu_f[-1] > 0.5  # of 0.15
+    assert (run.used_friction < 0.17).all()
+    assert "friction   std  used" in str(run)
+    assert "friction beyond what was used is mostly that of the vehicle file" in str(run)
+    told = estimate_sideslip(slippery, log)
+    assert told.error().covered > 0.9
+    assert told.mu_f[-1] < 0.2
+
+
 def test_least_squares_find_the_stiffness_behind_exact_readings(vehicle):
     rng = np.random.default_rng(0)
     alpha = 0.02 * rng.standard_normal((500, 2))
