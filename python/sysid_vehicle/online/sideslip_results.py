@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 _BAND_MPS2 = 2.0
 _BY_CHANCE = 0.05  # what a band of 2 standard deviations leaves outside
 _RARELY = 0.01  # of the samples, which noise alone makes large
+# Up to half of its peak a tyre curve is nearly straight, and tells little of the peak.
+_STRAIGHT = 0.5
 _UNUSED = (
-    "friction beyond what was used is mostly that of the vehicle file: too high on ice or snow"
+    "friction of which less than half was used is mostly that of the vehicle file: on ice or snow "
+    "it reads too high"
 )
 
 
@@ -206,8 +209,7 @@ class SideslipRun(Told):
             ]
             head = ["axle", "stiffness [kN/rad]", "std", "friction", "std", "used"]
             lines.append(text_table(head, rows))
-            least = np.stack([self.mu_f - 2.0 * self.mu_f_std, self.mu_r - 2.0 * self.mu_r_std])
-            if (at_most < least[:, k]).any():
+            if (at_most < _STRAIGHT * np.array([self.mu_f[k], self.mu_r[k]])).any():
                 lines.append(f"  {_UNUSED}")
         for mode, meaning in ((1, "too slow to tell"), (2, "with a sensor missing or refused")):
             share = float(np.mean(self.mode == mode))
