@@ -274,6 +274,21 @@ def test_noise_of_the_yaw_rate_does_not_make_the_stiffness_too_small(vehicle, lo
     assert off(chosen) < 0.5 * off(short)
 
 
+@pytest.mark.parametrize("seed", [852280, 829923, 556232])
+def test_the_interval_of_least_squares_holds_in_gentle_driving(vehicle, seed):
+    gentle = sv.manoeuvres.lap(40.0, 0.1 * sv.manoeuvres.peak_lateral_mps2(vehicle), 14.0)
+    run = cornering_stiffness(vehicle, sv.drive(sv.Model(vehicle), gentle, seed=seed))
+    for found, std, true in zip(
+        (run.cf_npr[-1], run.cr_npr[-1]),
+        (run.cf_std_npr[-1], run.cr_std_npr[-1]),
+        static_stiffness(vehicle),
+        strict=True,
+    ):
+        assert abs(found - true) < 3.0 * std
+        assert abs(found / true - 1.0) < 0.06
+        assert std < 0.06 * true
+
+
 def test_least_squares_leave_out_what_is_missing(vehicle, log):
     whole = cornering_stiffness(vehicle, log, window_s=0.15)
     columns = {name: np.array(log[name]) for name in log.channels}
