@@ -41,6 +41,9 @@ _VEHICLE_RANGES = {
 }
 
 _GEARS = ("steering_ratio", "steer_ratio")
+# Mass over wheelbase cubed: from 16 kg/m3 of a formula car to 730 of a loaded tractor, with model
+# cars and karts between.
+_USUAL_KGPM3, _LEAST_KGPM3, _MOST_KGPM3 = 60.0, 2.0, 6000.0
 _OPTIONAL = ("yaw_inertia_kgm2", "air_density_kgpm3")
 
 
@@ -130,11 +133,7 @@ class Vehicle:
         if self.yaw_inertia_kgm2 is not None:
             typical = self.usual_inertia_kgm2
             if not 0.1 <= self.yaw_inertia_kgm2 / typical <= 10.0:
-                raise InvalidInput(
-                    f"vehicle '{self.name}': yaw_inertia_kgm2 = {self.yaw_inertia_kgm2:g} does not "
-                    f"fit the mass and the wheelbase: cars lie near mass_kg * lf_m * lr_m = "
-                    f"{typical:.4g} kg m^2; correct the unit, or leave the key out to identify it"
-                )
+                raise InvalidInput(f"vehicle '{self.name}': {_inertia_or_mass(self)}")
 
     @property
     def wheelbase_m(self) -> float:
@@ -254,6 +253,25 @@ class Vehicle:
             for key, text in self._rows()
         )
         return f"<table><caption>{html.escape(self.name)}</caption>{cells}</table>"
+
+
+def _inertia_or_mass(vehicle: Vehicle) -> str:
+    """Which of mass and yaw inertia is wrong, where they do not fit: the wheelbase tells."""
+    inertia, typical, mass = vehicle.yaw_inertia_kgm2, vehicle.usual_inertia_kgm2, vehicle.mass_kg
+    cube = vehicle.wheelbase_m**3
+    if not _LEAST_KGPM3 <= mass / cube <= _MOST_KGPM3:
+        tonnes = _LEAST_KGPM3 <= 1e3 * mass / cube <= _MOST_KGPM3
+        return (
+            f"mass_kg = {mass:g} fits neither yaw_inertia_kgm2 = {inertia:g} nor the wheelbase of "
+            f"{vehicle.wheelbase_m:g} m (lf_m + lr_m), with which cars have about "
+            f"{_USUAL_KGPM3 * cube:.2g} kg; "
+            f"{'it seems to be in tonnes: multiply it by 1000' if tonnes else 'correct the unit'}"
+        )
+    return (
+        f"yaw_inertia_kgm2 = {inertia:g} does not fit the mass and the wheelbase of "
+        f"{vehicle.wheelbase_m:g} m: cars lie near mass_kg * lf_m * lr_m = {typical:.4g} kg m^2; "
+        f"correct the unit of the one that is wrong, or leave the yaw inertia out to identify it"
+    )
 
 
 def _checked_keys(content: Mapping[str, Any], tyres: Any, where: str) -> dict[str, Any]:

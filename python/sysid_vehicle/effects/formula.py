@@ -241,6 +241,9 @@ class Traced:
     def __neg__(self) -> Traced:
         return self._apply("negative", self)
 
+    def __pos__(self) -> Traced:
+        return self
+
     def __abs__(self) -> Traced:
         return self._apply("absolute", self)
 

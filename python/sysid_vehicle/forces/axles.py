@@ -16,7 +16,7 @@ from .._common.arrays import FloatArray, as_float64
 from .._common.progress import doing
 from .._common.typed import typed
 from ..errors import InvalidInput
-from ..log import Log, several_logs
+from ..log import Log, check_car, several_logs
 from ..sensors import SensorCheck, check
 from ..vehicle import Vehicle, slip_angles
 from .motion import Motion, Places, draws, smoothed
@@ -68,7 +68,8 @@ def axle_forces(
     Raises
     ------
     InvalidInput
-        If a log has no steering angle, or its sensors cannot be checked.
+        If a log has no steering angle, its sensors cannot be checked, or its wheel force or its
+        steering angle are not those of a car of this mass and wheelbase.
     NumericalError
         If the motion cannot be told.
 
@@ -99,6 +100,7 @@ def axle_forces(
     for log in together:
         if not np.isfinite(log["steer_rad"]).any():
             raise InvalidInput(f"{log.name}: steer_rad holds no value; map the steering angle")
+        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
     inertia = vehicle.yaw_inertia_kgm2 or vehicle.usual_inertia_kgm2
     places = Places.of(sensors)
     steer = places.values(sensors, "steer_rad")

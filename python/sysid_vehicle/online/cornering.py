@@ -32,6 +32,10 @@ _ENOUGH = 200  # samples with slip
 _SHORTEST_S, _LONGEST_S = 0.15, 1.0  # of the window; corners are smoothed away by a longer one
 _SLOWEST_MPS = 1.0  # below it slip angles mean nothing
 _NOISE_SHARE = 0.01  # of the variance of a slip angle
+# A parabola over w samples leaves 9 / (4 w) of the variance of white noise at its middle.
+_KEPT = 2.25
+_AY_STD_MPS2 = 0.1
+_MOST_FADED = 0.5  # with more no stiffness is told
 
 
 class CorneringRls:
@@ -64,7 +68,7 @@ class CorneringRls:
         *,
         forgetting: float = 0.999,
         prior_std_npr: float = 1e5,
-        ay_std_mps2: float = 0.1,
+        ay_std_mps2: float = _AY_STD_MPS2,
         yaw_acceleration_std_radps2: float = 0.1,
         least_slip_rad: float = 0.004,
         most_slip_rad: float = 0.03,
@@ -145,7 +149,8 @@ class CorneringRun(Told):
     time_s, cf_npr, cr_npr, cf_std_npr, cr_std_npr : ndarray
         Time, stiffness of the axles [N/rad] and their standard deviations. The stiffness is the
         secant of the tyre curve at the slips that were used; the standard deviation covers that of
-        the regression and what the tyres of the vehicle file bend away by up to there.
+        the regression, with the noise of the slip angles, what the tyres of the vehicle file bend
+        away by up to there, and what was put back of what noise in the slip angles takes from it.
     used : ndarray of bool
         Whether the sample held enough slip, and not too much.
     """
@@ -210,8 +215,8 @@ def cornering_stiffness(
     window_s : float, optional
         Slip angles and lateral acceleration are smoothed, and the yaw acceleration is taken, by
         local parabolas of this length, the same for all so that none lags. If left out, as long as
-        it takes for the noise of the yaw rate to be no more than 1 % of the variance of either slip
-        angle: noise in what is regressed on makes the stiffness too small.
+        it takes for the noise of sideslip and yaw rate to be no more than 1 % of the variance of
+        either slip angle, at most 1 s: noise in what is regressed on makes the stiffness too small.
     **settings : float
         Further arguments of :class:`CorneringRls`.
 
@@ -234,11 +239,12 @@ def cornering_stiffness(
     rate, vx = log["yaw_rate_radps"], log["vx_mps"]
     vx = np.where(vx > _SLOWEST_MPS, vx, np.nan)
     slips = slip_angles(vehicle.lf_m, vehicle.lr_m, log["steer_rad"], 1.0, np.tan(beta), rate / vx)
+    drift, turn = white_noise_std(beta, NOISE_BLOCK), white_noise_std(rate, NOISE_BLOCK) / vx
+    noises = [np.hypot(drift, arm * turn) for arm in (vehicle.lf_m, vehicle.lr_m)]
+    noises[0] = np.hypot(noises[0], white_noise_std(log["steer_rad"], NOISE_BLOCK))
     if window_s is None:
-        arms = (vehicle.lf_m, vehicle.lr_m)
-        noise = white_noise_std(rate, NOISE_BLOCK) / vx
         window_s = max(
-            _window_s(slip, arm * noise, log.rate_hz) for slip, arm in zip(slips, arms, strict=True)
+            _window_s(slip, noise, log.rate_hz) for slip, noise in zip(slips, noises, strict=True)
         )
     width = max(5, 2 * round(0.5 * window_s * log.rate_hz) + 1)
     if width > log.n:
@@ -255,8 +261,20 @@ def cornering_stiffness(
     )
     found = CorneringRls(vehicle, forgetting=forgetting, **settings).run(readings).T
     cf, cr, cf_std, cr_std, used = found
-    cf_std = np.hypot(cf_std, cf * _bent(vehicle.tyre_front, readings[:, 0], used))
-    cr_std = np.hypot(cr_std, cr * _bent(vehicle.tyre_rear, readings[:, 1], used))
+    # Noise of the slips, which both axles share, times the stiffness is one of the readings.
+    felt = (cf * noises[0] + cr * noises[1]) / vehicle.mass_kg
+    louder = np.hypot(1.0, _root_mean(felt, used) / settings.get("ay_std_mps2", _AY_STD_MPS2))
+    both = []
+    for tyre, slip, noise, c, std in (
+        (vehicle.tyre_front, readings[:, 0], noises[0], cf, cf_std),
+        (vehicle.tyre_rear, readings[:, 1], noises[1], cr, cr_std),
+    ):
+        faded = _faded(slip, _KEPT / width * noise**2, used)
+        whole = c / (1.0 - faded)
+        both.append(
+            (whole, np.hypot(std * louder, whole * np.hypot(_bent(tyre, slip, used), faded)))
+        )
+    (cf, cf_std), (cr, cr_std) = both
     run = CorneringRun(log.name, log["time_s"], cf, cr, cf_std, cr_std, used > 0.5)
     if not run.excited:
         warn(
@@ -281,6 +299,21 @@ def _bent(tyre: Tyre, slip_rad: FloatArray, used: FloatArray) -> FloatArray:
     straight = tyre.cornering_stiffness_per_load * np.where(weight > 0.0, slip_rad, 1.0)
     short = 1.0 - tyre.friction(np.where(weight > 0.0, slip_rad, 0.0)) / straight
     return np.asarray(np.abs(np.cumsum(weight * short)) / np.maximum(np.cumsum(weight), 1e-12))
+
+
+def _faded(slip_rad: FloatArray, noise: FloatArray, used: FloatArray) -> FloatArray:
+    """Share by which noise of that variance in the slips used so far makes the stiffness small."""
+    known = (used > 0.5) & np.isfinite(slip_rad) & np.isfinite(noise)
+    squares = np.cumsum(np.where(known, slip_rad**2, 0.0))
+    share = np.cumsum(np.where(known, noise, 0.0)) / np.maximum(squares, 1e-12)
+    return as_float64(np.minimum(share, _MOST_FADED))
+
+
+def _root_mean(noise: FloatArray, used: FloatArray) -> FloatArray:
+    """Root mean square over the samples used so far."""
+    known = (used > 0.5) & np.isfinite(noise)
+    squares = np.cumsum(np.where(known, noise**2, 0.0))
+    return np.asarray(np.sqrt(squares / np.maximum(np.cumsum(known), 1)))
 
 
 def _parabolas(y: FloatArray, width: int, derivative: int, step_s: float) -> FloatArray:
@@ -309,6 +342,5 @@ def _window_s(slip: FloatArray, noise: FloatArray, rate_hz: float) -> float:
     variance = float(np.mean(slip[known] ** 2)) - noise_variance if known.any() else 0.0
     if variance <= 0.0:
         return _LONGEST_S
-    # A parabola over w samples leaves 9 / (4 w) of the variance of white noise at its middle.
-    samples = 2.25 * noise_variance / (_NOISE_SHARE * variance)
+    samples = _KEPT * noise_variance / (_NOISE_SHARE * variance)
     return min(max(samples / rate_hz, _SHORTEST_S), _LONGEST_S)

@@ -13,10 +13,10 @@ from .._common.arrays import FloatArray, as_float64
 from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
-from ..log import Log
+from ..log import Log, check_car
 from ..tyre import Tyre
 from ..vehicle import Vehicle, vehicle_data
-from .sideslip_results import SideslipRun, judged, judged_by
+from .sideslip_results import SideslipRun, doubted, judged, judged_by
 from .sideslip_settings import NOISE_BLOCK, SideslipSettings
 
 #: Kinds of observers, with what each is.
@@ -259,18 +259,22 @@ def estimate_sideslip(
     Raises
     ------
     InvalidInput
-        If a channel is absent or the kind is not known.
+        If a channel is absent, the kind is not known, or wheel force or steering angle are not
+        those of a car of this mass and wheelbase.
     NumericalError
         If the filter leaves the range of numbers; the message gives the sample.
 
     Warns
     -----
     SysidWarning
-        If the car is too slow for the observer all the time, or the tyres of the vehicle file do
-        not fit the drive.
+        If the car is too slow for the observer all the time, the tyres of the vehicle file do not
+        fit the drive, or the dual observer has learnt far softer ones.
     """
+    check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
     settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
     run = run_over(log, SideslipObserver(vehicle, settings, kind), settings)
+    if kind == "dual":
+        doubted(run, static_stiffness(vehicle))
     if kind == "dual" or not judge or run.too_slow:
         return run
     return judged_by(run, run_over(log, SideslipObserver(vehicle, settings), settings))

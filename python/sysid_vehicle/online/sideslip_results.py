@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from .. import _core
 from .._common.arrays import FloatArray
 from .._common.printed import Told
 from .._common.style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
@@ -24,6 +25,13 @@ if TYPE_CHECKING:
 
 _BAND_MPS2 = 2.0
 _BY_CHANCE = 0.05  # what a band of 2 standard deviations leaves outside
+_RARELY = 0.01  # of the samples, which noise alone makes large
+# Up to half of its peak a tyre curve is nearly straight, and tells little of the peak.
+_STRAIGHT = 0.5
+_UNUSED = (
+    "friction of which less than half was used is mostly that of the vehicle file: on ice or snow "
+    "it reads too high"
+)
 
 
 @dataclass(frozen=True)
@@ -125,6 +133,19 @@ class SideslipRun(Told):
         return bool((self.mode == 1).all())
 
     @property
+    def used_friction(self) -> FloatArray:
+        """Side force of the front and the rear axle over their load at rest, as far as it went.
+
+        One in a hundred samples, which may be noise, is larger.
+        """
+        forces = np.abs(np.stack([self.fyf_n, self.fyr_n]))[:, self.mode == 0]
+        if not np.isfinite(forces).any(axis=1).all():
+            return np.zeros(2)
+        return np.asarray(
+            np.nanquantile(forces, 1.0 - _RARELY, axis=1) / self.vehicle.static_loads_n
+        )
+
+    @property
     def vy_mps(self) -> FloatArray:
         """Lateral speed at the centre of gravity."""
         return self.vx_mps * np.tan(self.beta_rad)
@@ -172,21 +193,24 @@ class SideslipRun(Told):
         ]
         running = np.flatnonzero(self.mode != 1)
         if running.size:
-            k = running[-1]
+            k, at_most = running[-1], self.used_friction
             rows = [
                 [
                     axle,
                     number(float(c[k]) / 1e3, 3),
                     number(float(s[k]) / 1e3, 2),
                     *([f"{x[k]:.2f}" for x in mu] if np.isfinite(mu[0][k]) else ["-", "-"]),
+                    f"{used:.2f}",
                 ]
-                for axle, c, s, mu in (
-                    ("front", self.cf_npr, self.cf_std_npr, (self.mu_f, self.mu_f_std)),
-                    ("rear", self.cr_npr, self.cr_std_npr, (self.mu_r, self.mu_r_std)),
+                for axle, c, s, mu, used in (
+                    ("front", self.cf_npr, self.cf_std_npr, (self.mu_f, self.mu_f_std), at_most[0]),
+                    ("rear", self.cr_npr, self.cr_std_npr, (self.mu_r, self.mu_r_std), at_most[1]),
                 )
             ]
-            head = ["axle", "stiffness [kN/rad]", "std", "friction", "std"]
+            head = ["axle", "stiffness [kN/rad]", "std", "friction", "std", "used"]
             lines.append(text_table(head, rows))
+            if (at_most < _STRAIGHT * np.array([self.mu_f[k], self.mu_r[k]])).any():
+                lines.append(f"  {_UNUSED}")
         for mode, meaning in ((1, "too slow to tell"), (2, "with a sensor missing or refused")):
             share = float(np.mean(self.mode == mode))
             if share > 0.0:
@@ -323,6 +347,40 @@ def judged_by(run: SideslipRun, dual: SideslipRun) -> SideslipRun:
         beta_std_rad=std,
         exact_std_rad=run.beta_std_rad,
         refuted=refuted,
+    )
+
+
+def doubted(run: SideslipRun, told_npr: tuple[float, float]) -> None:
+    """Warn where the dual observer has learnt far softer tyres than it was told.
+
+    On ice and snow stiffness and friction are a share of those on a dry road, and a curve that
+    bends early is explained by the stiffness alone. Tyres that are stiffer than told do no harm.
+
+    Parameters
+    ----------
+    run : SideslipRun
+        By the dual observer.
+    told_npr : (front, rear)
+        Cornering stiffness of the vehicle file [N/rad].
+
+    Warns
+    -----
+    SysidWarning
+        If a stiffness is less than two standard deviations of what is expected at first allow.
+    """
+    running = np.flatnonzero(run.mode != 1)
+    if not running.size:
+        return
+    learnt = np.array([run.cf_npr[running[-1]], run.cr_npr[running[-1]]])
+    ratio = learnt / told_npr
+    expected = _core.sideslip_defaults()["stiffness_prior"]
+    if np.log(ratio).min() >= -2.0 * expected:
+        return
+    warn(
+        f"{run.log_name}: the cornering stiffness is {ratio[0]:.2g} (front) and {ratio[1]:.2g} "
+        f"(rear) times that of '{run.vehicle.name}', far from what was told: other tyres, ice or "
+        "snow. The band of the sideslip may be far too narrow then, and the friction too high; "
+        "give tyres of this car on this surface (fitted_vehicle)"
     )
 
 

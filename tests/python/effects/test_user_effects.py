@@ -40,12 +40,12 @@ def drag_of_users(**changes: object) -> sv.Effect:
 
 def test_every_operation_gives_the_numbers_of_numpy() -> None:
     def everything(d, p):  # type: ignore[no-untyped-def]
-        u = p.a * d.v_x + d.steer - d.v_y / d.v_x
+        u = +p.a * d.v_x + d.steer - d.v_y / d.v_x
         v = np.sin(u) * np.cos(d.r) + np.tan(d.r) + np.arctan(u) + np.arctan2(d.v_y, d.v_x)
         w = np.sqrt(d.v_x) + np.exp(-np.abs(u)) + np.log(d.v_x) + np.tanh(u) + np.sign(d.v_y)
         x = np.minimum(u, d.r) * np.maximum(u, 0.1) + np.where(d.v_y > 0.0, u, -u)
         y = np.clip(u, -0.5, 0.5) + d.v_x**3 + d.v_x**-1 + d.v_x**1.5 + np.square(u) + d.v_x**0.5
-        return p.a * (v + w + x + y + np.where(d.v_y < d.r, 2.0, 3.0) + 2.0**p.a)
+        return p.a * (np.positive(v) + w + x + y + np.where(d.v_y < d.r, 2.0, 3.0) + 2.0**p.a)
 
     effect = sv.define_effect(
         "everything",

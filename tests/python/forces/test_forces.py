@@ -149,6 +149,13 @@ def test_wrong_arguments_are_refused(truth: Drive, found: sv.AxleForces) -> None
         found.vehicle = replace(found.vehicle)  # type: ignore[misc]
 
 
+def test_a_mass_that_is_not_the_cars_is_told(found: sv.AxleForces) -> None:
+    (log,) = found.sensors.logs
+    pounds = found.vehicle.replace(mass_kg=found.vehicle.mass_kg / 0.45359237)
+    with pytest.raises(sv.InvalidInput, match="mass_kg seems to be in pounds"):
+        sv.axle_forces(log, pounds, sensors=found.sensors)
+
+
 def test_the_command(truth: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, car = tmp_path / "drive.csv", tmp_path / "car.toml"
     truth.log.between(12.0, 18.0).to_csv(log)

@@ -122,6 +122,11 @@ def test_all_missing_keys_are_named_at_once(car_file: Path) -> None:
         ("lr_m = 1.5", "lr_m = 1500", ["lr_m = 1500", "metres"]),
         ("brake_front_share = 0.65", "brake_front_share = 65", ["brake_front_share", "0 to 1"]),
         ("yaw_inertia_kgm2 = 2500.0", "yaw_inertia_kgm2 = 2.5", ["yaw_inertia_kgm2", "2700"]),
+        (
+            "mass_kg = 1500",
+            "mass_kg = 1.5",
+            ["mass_kg = 1.5 fits neither yaw_inertia_kgm2 = 2500", "tonnes: multiply it by 1000"],
+        ),
         ("B = 12.0", "B = 0.0", ["[tyre.rear]", "B = 0", "> 0"]),
         ("E = -0.5", "E = 1.5", ["[tyre.rear]", "E = 1.5", "<= 1"]),
         (

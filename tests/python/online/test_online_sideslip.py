@@ -175,6 +175,42 @@ def test_what_cannot_be_is_refused(vehicle, log):
         observer.run(np.ones(3), np.zeros((3, 4)))
 
 
+def test_a_log_of_another_car_is_refused(vehicle, log):
+    pounds = vehicle.replace(mass_kg=vehicle.mass_kg / 0.45359237)
+    with pytest.raises(InvalidInput, match="mass_kg seems to be in pounds"):
+        estimate_sideslip(pounds, log)
+
+
+def on_ice(vehicle):
+    """The car with a seventh of its friction, and a quarter of its cornering stiffness."""
+    tyres = {
+        axle: getattr(vehicle, axle).replace(
+            D=0.15 * getattr(vehicle, axle).D, B=1.6 * getattr(vehicle, axle).B
+        )
+        for axle in ("tyre_front", "tyre_rear")
+    }
+    return vehicle.replace(**tyres)
+
+
+def test_on_ice_with_tyres_of_a_dry_road_nobody_is_told_that_the_friction_is_known(vehicle):
+    slippery = on_ice(vehicle)
+    most = 0.8 * sv.manoeuvres.peak_lateral_mps2(slippery)
+    slow = sv.manoeuvres.Knots((0.0, 30.0, 60.0), (10.0, 13.0, 11.0))  # braked by the ice alone
+    lap = dataclasses.replace(sv.manoeuvres.lap(60.0, most, 14.0), speed_mps=slow)
+    log = sv.drive(sv.Model(slippery), lap, seed=255841, rate_hz=50.0)
+    with pytest.warns(SysidWarning, match=r"the cornering stiffness is 0\.2\d .* ice or snow"):
+        run = estimate_sideslip(vehicle, log)
+    assert run.mu_f[-1] > 0.5  # of 0.15
+    assert (run.used_friction < 0.17).all()
+    assert "friction   std  used" in str(run)
+    unused = "friction of which less than half was used is mostly that of the vehicle file"
+    assert unused in str(run)
+    told = estimate_sideslip(slippery, log)
+    assert unused not in str(told)
+    assert told.error().covered > 0.9
+    assert told.mu_f[-1] < 0.2
+
+
 def test_least_squares_find_the_stiffness_behind_exact_readings(vehicle):
     rng = np.random.default_rng(0)
     alpha = 0.02 * rng.standard_normal((500, 2))
@@ -236,6 +272,21 @@ def test_noise_of_the_yaw_rate_does_not_make_the_stiffness_too_small(vehicle, lo
         return abs(run.cr_npr[-1] / quiet.cr_npr[-1] - 1.0)
 
     assert off(chosen) < 0.5 * off(short)
+
+
+@pytest.mark.parametrize("seed", [852280, 829923, 556232])
+def test_the_interval_of_least_squares_holds_in_gentle_driving(vehicle, seed):
+    gentle = sv.manoeuvres.lap(40.0, 0.1 * sv.manoeuvres.peak_lateral_mps2(vehicle), 14.0)
+    run = cornering_stiffness(vehicle, sv.drive(sv.Model(vehicle), gentle, seed=seed))
+    for found, std, true in zip(
+        (run.cf_npr[-1], run.cr_npr[-1]),
+        (run.cf_std_npr[-1], run.cr_std_npr[-1]),
+        static_stiffness(vehicle),
+        strict=True,
+    ):
+        assert abs(found - true) < 3.0 * std
+        assert abs(found / true - 1.0) < 0.06
+        assert std < 0.06 * true
 
 
 def test_least_squares_leave_out_what_is_missing(vehicle, log):

@@ -285,9 +285,7 @@ def _felt(what: Quantity, p: FloatArray) -> FloatArray:
     return as_float64(np.where(np.isfinite(slope), slope, 0.0))
 
 
-def _moved(
-    p: FloatArray, box: Box, along: FloatArray, what: Quantity, target: float
-) -> FloatArray:
+def _moved(p: FloatArray, box: Box, along: FloatArray, what: Quantity, target: float) -> FloatArray:
     """From a point that is known, along the direction that costs least, to a quantity's target.
 
     On the parameters' scales: where B, C and D move by shares B C D stays what it is, which a

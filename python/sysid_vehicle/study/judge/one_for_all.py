@@ -17,6 +17,7 @@ from ...effects import Effect
 from ...errors import NumericalError
 from ...identify import Fit, refine, with_exact_inputs
 from ...rules import Rules, bic
+from .slip_of_the_file import slip_of_the_file
 
 _IN_THE_FILE = {
     "aero_drag": "drag_area_m2 of the vehicle file",
@@ -30,10 +31,11 @@ _IN_THE_FILE = {
 def one_for_all(
     baseline: Fit, final: Fit, added: Sequence[str], sought: Collection[str], rules: Rules
 ) -> str:
-    """Say which effect that was left out, or is fixed, explains as much as all that were added.
+    """Say which slip of the vehicle file, or effect that was not sought, explains what was added.
 
-    Refitted in their place, it has to be as likely on the training data by the BIC, which its fewer
-    parameters may let it be, and of a size that a car can have.
+    An effect that was left out, or is fixed, and is refitted in the place of all that were added
+    has to be as likely on the training data by the BIC, which its fewer parameters may let it be,
+    and of a size that a car can have.
 
     Parameters
     ----------
@@ -47,8 +49,11 @@ def one_for_all(
     Returns
     -------
     str
-        A sentence; empty where there is no such effect.
+        A sentence; empty where there is no such slip or effect.
     """
+    slip = slip_of_the_file(final, added)
+    if slip:
+        return slip
     if len(added) < 2:
         return ""
     enough = _merit(final)
