@@ -90,6 +90,8 @@ def test_where_its_size_does_not_matter_that_is_said(start: Model, truth: Model)
     assert "an error remains" in found.meaning
     assert "below the errors that matter" in found.meaning
     assert "On all data together: an error that depends on the driving remains" in str(found)
+    (step,) = found.next_steps
+    assert step.startswith("where that matters to you, add driving like the validation data")
     assert contradictions(str(found)) == []
 
 
@@ -100,10 +102,12 @@ def test_an_uneven_road_is_no_reason_to_look_for_more(start: Model, truth: Model
     assert found.test[-1].error > 1.5
     assert found.verdict == "adequate"
     assert "from disturbances like those of the training data" in found.meaning
+    assert found.next_steps == ()
     assert contradictions(str(found)) == []
     smooth = studied(start, truth)
     assert smooth.verdict == "adequate"
     assert "disturbances" not in smooth.meaning
+    assert smooth.next_steps == ()
 
 
 def test_tyres_that_no_training_data_showed_are_no_disturbance(start: Model, truth: Model) -> None:

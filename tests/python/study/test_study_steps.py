@@ -83,6 +83,18 @@ def test_what_fits_to_the_last_digit_alike_is_no_alternative(dx: Diagnosis) -> N
     assert [c.id for c in alternatives(replace(dx, ranking=others), wind)] == ["rolling_resistance"]
 
 
+@pytest.mark.parametrize(("below", "asked"), [(2.0, ["aero_drag"]), (10.0, [])])
+def test_what_is_as_likely_by_its_price_need_not_be_significant(
+    dx: Diagnosis, below: float, asked: list[str]
+) -> None:
+    """Two parameters of another effect fit by chance what the one of the right effect does not."""
+    wind, drag = (next(c for c in dx.ranking if c.id == name) for name in ("head_wind", AGAINST[0]))
+    assert wind.fit is not None
+    fit = replace(by_id(dx, drag.id), log_likelihood=wind.fit.log_likelihood - below)
+    weak = replace(drag, statistic=0.1 * wind.statistic, p_value=1.0, fit=fit)
+    assert [c.id for c in alternatives(replace(dx, ranking=(wind, weak)), wind)] == asked
+
+
 @pytest.mark.manual
 def test_a_slope_and_a_bias_give_way_to_rolling_resistance(start: Model, truth: Model) -> None:
     """Beside the slope the bias does to the last digit what rolling resistance does alone."""

@@ -33,7 +33,10 @@ def next_steps(study: Study) -> tuple[str, ...]:
     if study.train[-1].unrelated:
         return (_MEND,)
     if study.verdict == "adequate":
-        return ()
+        # Too small to matter as a rule, and told even so.
+        return (
+            (f"where that matters to you, {_drive_alike(study)}",) if only_elsewhere(study) else ()
+        )
     found = [*_of_names(study)]
     if study.verdict in LACKING:
         found += _of_what_is_left(study)
@@ -140,13 +143,17 @@ def _of_the_search(study: Study) -> list[str]:
             "heading, an effect of the car with the same manoeuvre"
         )
     if only_elsewhere(study):
-        what = "the remaining error" if study.added else "what is missing"
-        found.append(
-            "add driving like the validation data to the training data, and validate with other "
-            f"driving of that kind: {what} {in_training(study)}, and no effect can be named that "
-            "they do not excite"
-        )
+        found.append(_drive_alike(study))
     return found
+
+
+def _drive_alike(study: Study) -> str:
+    what = "the remaining error" if study.added else "what is missing"
+    return (
+        "add driving like the validation data to the training data, and validate with other "
+        f"driving of that kind: {what} {in_training(study)}, and no effect can be named that "
+        "they do not excite"
+    )
 
 
 def _of_sensors(study: Study) -> list[str]:

@@ -131,24 +131,26 @@ def _can_be(c: Candidate, rules: Rules) -> bool:
 
 
 def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
-    """Effects that act like the chosen one and nearly were, the likeliest first.
+    """Effects that act like the chosen one and nearly were, or are as likely, the likeliest first.
 
     Of those that were refitted: the others came nowhere near, or would take for ever. The catalogue
-    says what acts like what, and the driving may add to it. What fits to the last digit as the
-    chosen one does is the same thing by another name: an alternative only if there is an effect
-    already that it may make needless, as rolling resistance does a slope with a sensor's bias.
+    says what acts like what, and the driving may add to it. What is as likely by its price need not
+    be significant, nor act alike. What fits to the last digit as the chosen one does is the same
+    thing by another name: an alternative only if there is an effect already that it may make
+    needless, as rolling resistance does a slope with a sensor's bias.
     """
     same = 0.0 if dx.fit.model.effects else dx.rules.same
-    alike = [
-        c
-        for c in dx.significant
-        if c.fit is not None
-        and c.id != chosen.id
-        and c.statistic > dx.rules.near * chosen.statistic
-        and abs(c.statistic - chosen.statistic) >= same
-        and (c.effect.is_like(chosen.effect) or c.id in chosen.indistinguishable_from)
-    ]
-    return tuple(alike[:_ALTERNATIVES])
+    likely = np.inf if chosen.fit is None else _as_searched(chosen.fit) - dx.rules.apart
+
+    def near(c: Candidate, fit: Fit) -> bool:
+        if c not in dx.significant:
+            return _as_searched(fit) > likely
+        alike = c.effect.is_like(chosen.effect) or c.id in chosen.indistinguishable_from
+        return alike and c.statistic > dx.rules.near * chosen.statistic
+
+    others = [c for c in dx.ranking if c.id != chosen.id]
+    apart = [c for c in others if abs(c.statistic - chosen.statistic) >= same]
+    return tuple([c for c in apart if c.fit is not None and near(c, c.fit)][:_ALTERNATIVES])
 
 
 def in_common(
