@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import _core
 from .._common.arrays import FloatArray
-from ..errors import InvalidInput
+from ..errors import InvalidInput, near_names
 
 _PARTS = _core.formula_parts()
 _OPERATIONS = {name: number for number, name in enumerate(_PARTS["operations"])}
@@ -326,8 +326,12 @@ def trace(
         d = read("signal", known) | read("channel", channels) | read("state", states)
         result = function(SimpleNamespace(**d), SimpleNamespace(**read("parameter", parameters)))
     except AttributeError as e:
+        signals, lapse = (*known, *channels, *states), str(e)
+        if isinstance(e.obj, SimpleNamespace):
+            name = str(e.name)
+            lapse = f"there is no '{name}' here{near_names(name, (*signals, *parameters))}"
         raise InvalidInput(
-            f"{what}: {e}; its signals are {', '.join((*known, *channels, *states))}, "
+            f"{what}: {lapse}; its signals are {', '.join(signals)}, "
             f"its parameters {', '.join(parameters)}"
         ) from e
     except InvalidInput as e:

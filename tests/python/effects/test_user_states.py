@@ -270,9 +270,9 @@ def test_tables_that_are_none(knots: list[float], values: list[float]) -> None:
         ({"channels": {"v_x": (0.0, 1.0)}}, "'v_x' is taken"),
         ({"channels": {"track degC": (0.0, 1.0)}}, "rename the column"),
         ({"channels": {"track_degC": (3.0, 1.0)}}, "give \\(lowest, highest\\)"),
-        ({"channels": {}}, "no attribute 'track_degC'"),
-        ({"states": []}, "no attribute 'T'"),
-        ({"force_x": lambda d, p: p.gain * d.a_y}, "no attribute 'a_y'"),
+        ({"channels": {}}, "there is no 'track_degC'"),
+        ({"states": []}, "there is no 'T'"),
+        ({"force_x": lambda d, p: p.gain * d.a_y}, "there is no 'a_y'"),
     ],
 )
 def test_definitions_that_cannot_work(changes: dict[str, Any], message: str) -> None:
