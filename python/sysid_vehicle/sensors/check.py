@@ -158,9 +158,13 @@ def checked(
     def of_all(lacks: frozenset[str]) -> Estimate:
         return of(means, stretches, lacks)
 
+    @cache  # that of one explanation is asked for against each of its rivals
+    def misfit_of(found: Estimate, noise: Estimate) -> float:
+        return misfit(means, found, noise)
+
     def against(found: Estimate, lacks: frozenset[str]) -> Rival:
         other = of_all(lacks)
-        return Rival(other, preferred(means, found, other))
+        return Rival(other, preferred(misfit_of, found, other))
 
     def explained(found: Estimate, lacks: frozenset[str]) -> tuple[Estimate, Faults]:
         parts = []
@@ -185,7 +189,7 @@ def checked(
             if not left or best is None or best.worse >= 0.0:
                 break
             better = of(means, stretches, lacks, best.estimate.faults)
-            if preferred(means, better, found) <= 0.0:
+            if preferred(misfit_of, better, found) <= 0.0:
                 break
             found = better
             faults = told_of(found, parts=parts)
@@ -200,7 +204,7 @@ def checked(
             if kind <= {*SLIPS} and not claimed:
                 continue
             other = of_all(lacks - kind)
-            if preferred(means, other, found) > _LIKELIER and _may_be(other):
+            if preferred(misfit_of, other, found) > _LIKELIER and _may_be(other):
                 instead, left = explained(other, lacks - kind)
                 # Wheels that slip take the place of faults, and bring none.
                 if kind <= {*SLIPS} and not claimed.issuperset(f.name for f in left if f.found):

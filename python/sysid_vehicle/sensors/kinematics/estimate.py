@@ -14,7 +14,7 @@ basis functions, ICRA 2012, which let every reading enter at its own time.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -233,25 +233,27 @@ def estimate(
     )
 
 
-def preferred(readings: Sequence[Readings], one: Estimate, other: Estimate) -> float:
+def preferred(
+    misfit_of: Callable[[Estimate, Estimate], float], one: Estimate, other: Estimate
+) -> float:
     """How much likelier one explanation is than another, priors included [nats].
 
     Each is judged with the noise that either has learned: with its own alone, one that lays much
     to noise would have no misfit.
+
+    Parameters
+    ----------
+    misfit_of : callable
+        `misfit` of the readings, from an explanation and what has learned the noise.
+    one, other : Estimate
     """
     claimed = set(one.faults) - set(other.faults)
     costs = [
         sum(FAULTS[name].cost(f, one_sided=name in claimed) for name, f in of.faults.items())
         for of in (other, one)
     ]
-    return (
-        costs[0]
-        - costs[1]
-        + 0.5
-        * sum(
-            misfit(readings, other, noise) - misfit(readings, one, noise) for noise in (one, other)
-        )
-    )
+    apart = sum(misfit_of(other, noise) - misfit_of(one, noise) for noise in (one, other))
+    return costs[0] - costs[1] + 0.5 * apart
 
 
 def misfit(readings: Sequence[Readings], found: Estimate, noise: Estimate) -> float:
