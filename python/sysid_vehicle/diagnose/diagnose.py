@@ -74,7 +74,8 @@ def diagnose(
         took up the effect is learned anew.
     follow_all : bool
         Whether what noise may hide is refitted to its maximum however far below the best effect it
-        ends. A search that adds the best one asks again beside it.
+        ends, and what scores far less where the best one has a value that no car can have. A search
+        that adds the best one asks again beside it.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     time_limit_s : float, optional
@@ -125,7 +126,9 @@ def diagnose(
             found = {c.id for c in on_the_level}
             finished = [*on_the_level, *(c for c in finished if c.id not in found)]
         told = _told(finished, far, ranked, chosen)
-    return _with_errors(
+    if refits:
+        unfollowed += tuple(c.id for c in told if c.fit is None and c.p_value < rules.alpha)
+    dx = _with_errors(
         Diagnosis(
             fit,
             driving,
@@ -138,10 +141,15 @@ def diagnose(
             unfollowed=unfollowed,
         )
     )
+    if follow_all and unfollowed and not told[0].can_be(rules):
+        return with_unfollowed(dx, ends)
+    return dx
 
 
 def with_unfollowed(dx: Diagnosis, ends: float = np.inf) -> Diagnosis:
     """The same with evidence for what it had not followed, as it came nowhere near the best effect.
+
+    It may be what is missing even so, where the best one holds nowhere else.
 
     Parameters
     ----------
@@ -151,7 +159,7 @@ def with_unfollowed(dx: Diagnosis, ends: float = np.inf) -> Diagnosis:
     """
     with Workers(None) as pool:
         chosen = Refitting(dx.fit, dx.driving, dx.rules, (), pool, ends, False)
-        more = chosen.hidden(dx.ranking, dx.unfollowed)
+        more = chosen.left_out(dx.ranking, dx.unfollowed)
         if not more:
             return replace(dx, unfollowed=())
         new = {c.id for c in more}

@@ -140,3 +140,25 @@ def test_a_search_names_what_it_has_not_followed(
     monkeypatch.setattr(refitting.Refitting, "_leaves_more", lambda *args: True)
     assert diagnose(fit, candidates=names, follow_all=False).unfollowed == ("steer_lag",)
     assert diagnose(fit, candidates=names).unfollowed == ()
+
+
+def test_beside_tyres_that_no_car_has_what_hardly_scores_is_found(
+    truth: Model, start: Model
+) -> None:
+    """All motion read far from the centre of gravity leaves the rear axle without stiffness."""
+    names = ("forward_m", "left_m")
+    hidden = dict(zip((f"ins_lever_arm.{n}" for n in names), (1.6, 0.8), strict=True))
+    car = truth.add("ins_lever_arm").with_values(hidden)
+    sweep = manoeuvres.sine_sweep(15.0, 25.0, 3.5)
+    fit = identify(start, drive(car, sweep, seed=6, rate_hz=50.0), starts=3)
+    assert fit["cornering stiffness rear"].value < 1e3
+    candidates = ("steer_ratio", "mass", "yaw_inertia", "ins_lever_arm")
+    by_search = diagnose(fit, candidates=candidates, follow_all=False)
+    assert by_search.ranking[0].id == "steer_ratio"
+    assert not by_search.ranking[0].can_be()
+    assert "ins_lever_arm" in by_search.unfollowed
+    for dx in (diagnose(fit, candidates=candidates), with_unfollowed(by_search)):
+        best = dx.ranking[0]
+        assert best.id == "ins_lever_arm"
+        assert np.all(np.abs(np.subtract(best.value, (1.6, 0.8))) < 4.0 * np.array(best.std))
+        assert not dx.unfollowed

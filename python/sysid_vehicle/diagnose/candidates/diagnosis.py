@@ -55,8 +55,8 @@ class Diagnosis(Printed):
     proposed : Causes
         Posterior of a sum of single effects over the scores, linearised at the fit; see `causes`.
     unfollowed : tuple of str
-        What noise may hide and comes nowhere near the best effect, where a search asked for no
-        more: their scores stand (`with_unfollowed`).
+        What comes nowhere near the best effect, by its score or, where noise may hide it, by few
+        samples: their scores stand (`with_unfollowed`).
     """
 
     fit: Fit
