@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
+from .._common.memo import forget
 from .._common.progress import teller
 from .._common.threads import before
 from .._common.typed import typed
@@ -130,6 +131,7 @@ def improve(
     rules = wants.rules
     schedule = Schedule.of(began, wants.limit_s)
     judging = Judging(schedule.judging)
+    forget()  # what is remembered of earlier studies: that of many would fill the memory
     train, test, kinematics, checked = _ready(train, test, sensors, schedule.sensors)
     if not checked:
         judging.left_out.append(_CHANNELS)
