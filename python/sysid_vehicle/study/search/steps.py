@@ -134,10 +134,10 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
     """Effects that act like the chosen one and nearly were, or are as likely, the likeliest first.
 
     Of those that were refitted: the others came nowhere near, or would take for ever. The catalogue
-    says what acts like what, and the driving may add to it. What is as likely by its price need not
-    be significant, nor act alike. What fits to the last digit as the chosen one does is the same
-    thing by another name: an alternative only if there is an effect already that it may make
-    needless, as rolling resistance does a slope with a sensor's bias.
+    says what acts like what, and the driving may add to it. What is not significant by its score,
+    and as likely by its price, need not act alike. What fits to the last digit as the chosen one
+    does is the same thing by another name: an alternative only if there is an effect already that
+    it may make needless, as rolling resistance does a slope with a sensor's bias.
     """
     same = 0.0 if dx.fit.model.effects else dx.rules.same
     likely = np.inf if chosen.fit is None else _as_searched(chosen.fit) - dx.rules.apart
