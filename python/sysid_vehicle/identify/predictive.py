@@ -55,8 +55,7 @@ class _Remembered:
     def __call__(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
         """How far parameters are from the fit, in its standard errors, as residuals."""
         x = p[self.box.columns]
-        ratio = self.box.units(x) / self.box.units(self.fitted)
-        off = np.where(self.box.positive, np.log(ratio), x - self.fitted)
+        off = self.box.apart(self.fitted, x)
         slopes = np.zeros((len(x), len(p)))
         slopes[:, self.box.columns] = self.root / self.box.units(x)
         return as_float64(-self.root @ off), slopes

@@ -224,7 +224,7 @@ def _side(at: Optimum, what: Quantity, sign: float) -> _Side:
         return side
     distance = min(LEVEL * std, furthest)
     inside, outside, longest = (0.0, 0.0, at.p), (np.inf, np.inf), np.inf  # longest step
-    along = across / variance / box.units(at.p[box.columns])
+    along = box.on_scales(at.p, across / variance)
     for _ in range(_POINTS):
         start = _moved(inside[2], box, along, what, centre + sign * distance)
         there, loss = _pinned(at, start, what, centre + sign * distance, std)
@@ -271,7 +271,7 @@ def lost_at(at: Optimum, what: Quantity, value: float) -> float:
     across, variance = at.across(what)
     if not (np.isfinite(variance) and variance > 0.0):
         return np.inf
-    along = across / variance / at.box.units(at.p[at.box.columns])
+    along = at.box.on_scales(at.p, across / variance)
     start = _moved(at.p, at.box, along, what, value)
     return _pinned(at, start, what, value, float(np.sqrt(variance)))[1]
 

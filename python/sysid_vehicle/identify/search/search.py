@@ -59,6 +59,10 @@ class Box:
         there = np.where(positive, x * np.exp(np.where(positive, step, 0.0)), x + step)
         return as_float64(np.clip(there, self.lower, self.upper))
 
+    def on_scales(self, p: FloatArray, step: FloatArray) -> FloatArray:
+        """A small step of the free parameters, from all parameters `p`, on their scales."""
+        return as_float64(step / self.units(p[self.columns]))
+
     def apart(self, x: FloatArray, other: FloatArray) -> FloatArray:
         """The step, on the scales of the free parameters, from one point to another."""
         positive = self.positive

@@ -15,8 +15,9 @@ from ..._common.text import few, unit_after, with_error
 from ...diagnose.diagnose import diagnose
 from ...effects import Effect
 from ...errors import NumericalError
-from ...identify import Fit, refine, with_exact_inputs
-from ...rules import Rules, bic
+from ...identify import Fit, refine
+from ...rules import Rules
+from ..search.steps import merit
 from .slip_of_the_file import slip_of_the_file
 
 _IN_THE_FILE = {
@@ -56,15 +57,15 @@ def one_for_all(
         return slip
     if len(added) < 2:
         return ""
-    enough = _merit(final)
+    enough = merit(final)
     found = [
         (e, fit)
         for e, fit in (*_fixed(baseline), *_left_out(baseline, sought, rules))
-        if _merit(fit) >= enough
+        if merit(fit) >= enough
     ]
     if not found:
         return ""
-    e, fit = max(found, key=lambda at: _merit(at[1]))
+    e, fit = max(found, key=lambda at: merit(at[1]))
     sizes = ", ".join(
         f"{p.name} {with_error(fit[n].value, fit[n].std, fit[n].bounds)}{unit_after(p.unit)}"
         for n, p in e.named.items()
@@ -74,10 +75,6 @@ def one_for_all(
         f"{few(added)} may be one error: {e.id}, which was not sought, explains the training data "
         f"as well in place of all of them ({sizes}); check {where}, or let the study seek {e.id}"
     )
-
-
-def _merit(fit: Fit) -> float:
-    return bic(with_exact_inputs(fit), len(fit.model.free_names), fit.driving.samples)
 
 
 def _fixed(baseline: Fit) -> list[tuple[Effect, Fit]]:

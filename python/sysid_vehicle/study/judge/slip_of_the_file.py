@@ -15,9 +15,9 @@ import numpy as np
 
 from ..._common.text import few
 from ...errors import NumericalError
-from ...identify import Fit, refine, with_exact_inputs
-from ...rules import bic
+from ...identify import Fit, refine
 from ...vehicle import Vehicle
+from ..search.steps import merit
 
 _PLACES = ("cg_position", "imu_lever_arm", "speed_sensor_lever_arm", "ins_lever_arm")
 _SHARES = ("brake_front_share", "drive_front_share")
@@ -51,9 +51,9 @@ def slip_of_the_file(final: Fit, added: Sequence[str]) -> str:
             with suppress(NumericalError, np.linalg.LinAlgError):
                 model = replace(final.model, vehicle=car).drop(*gone)
                 fit = refine(model, final.driving, final.noise)
-                found.append((_merit(fit), said, [e for e in added if e in gone]))
-    merit, said, needless = max(found, default=(-np.inf, "", []))
-    if merit < _merit(final):
+                found.append((merit(fit), said, [e for e in added if e in gone]))
+    best, said, needless = max(found, default=(-np.inf, "", []))
+    if best < merit(final):
         return ""
     them = "it" if len(needless) == 1 else "them"
     return (
@@ -75,7 +75,3 @@ def _slips(car: Vehicle) -> list[tuple[str, Vehicle, tuple[str, ...]]]:
         other = 1.0 - getattr(car, key)
         found.append((f"{key} = {other:g}", car.replace(**{key: other}), ("force_split",)))
     return found
-
-
-def _merit(fit: Fit) -> float:
-    return bic(with_exact_inputs(fit), len(fit.model.free_names), fit.driving.samples)
