@@ -114,7 +114,8 @@ def predict(fit: Fit, driving: Driving, noise: NoiseModel) -> Prediction:
         The model fails on the other driving.
     """
     remembered = _remembered(fit)
-    box, p = remembered.box, fit.model.vector()
+    # A lag of which nothing was searched stands at none, which no box of lags holds.
+    box, p = remembered.box, remembered.box.inside(fit.model.vector())
     problem = driving_of(fit, driving).problem(fit.model)
     other = Penalised(problem, (remembered,))
     frozen = problem.freeze(p, noise.vector())
@@ -142,7 +143,7 @@ def predict(fit: Fit, driving: Driving, noise: NoiseModel) -> Prediction:
 def _remembered(fit: Fit) -> _Remembered:
     """What the fitted driving told; of what it did not show, what the parameters' bounds tell."""
     box = free_box(fit.model)
-    p = fit.model.vector()
+    p = box.inside(fit.model.vector())
     objective = objective_of(fit.model, fit.driving.problem(fit.model), fit.driving)
     _, _, information = objective.normal_equations(
         p, objective.freeze(p, fit.noise.vector()), box.columns

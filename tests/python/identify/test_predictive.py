@@ -8,6 +8,7 @@ import pytest
 from sysid_vehicle import Fit, Log, Model, drive, identify, manoeuvres
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import predict
+from sysid_vehicle.identify.maximum import unmoved
 from sysid_vehicle.identify.predictive import _remembered
 
 
@@ -76,3 +77,12 @@ def test_what_both_drivings_saw_lies_between(
     one, between, two = (f.derived[0] for f in (fit, both, anew))
     assert two.value - one.value > 5.0 * one.std
     assert one.value + 2.0 * one.std < between.value < two.value - 2.0 * two.std
+
+
+def test_a_lag_that_nobody_searched_predicts_as_none(fit: Fit, course: Log) -> None:
+    lagging = unmoved(fit.model.add("steer_lag"), fit.driving, fit.noise)
+    assert lagging.model.value("steer_lag.time_constant_s") == 0.0
+    found, without = (predict(f, Driving.of(course), f.noise) for f in (lagging, fit))
+    assert found.log_density.sum() == pytest.approx(
+        without.log_density.sum(), abs=10.0
+    )  # its price

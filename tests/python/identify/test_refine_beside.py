@@ -7,6 +7,7 @@ from sysid_vehicle import Model, Vehicle, manoeuvres
 from sysid_vehicle.estimate import Driving, first_guess
 from sysid_vehicle.identify import Fit, refine, refine_beside
 from sysid_vehicle.identify.maximum import THINNED
+from sysid_vehicle.log import Log
 from sysid_vehicle.simulate import drive
 
 _LENGTH = "tyre_relaxation.relaxation_length_m"
@@ -70,3 +71,18 @@ def test_noise_of_other_time_scales_is_not_tried_where_nobody_wants_it(
     near = (relaxing.model, relaxing.driving, relaxing, relaxing.log_likelihood)
     assert refine_beside(*near, worth) is None
     assert asked[0].log_likelihood == pytest.approx(relaxing.log_likelihood, abs=0.5)
+
+
+def test_a_lag_that_would_be_a_lead_is_none_at_all(car: Vehicle) -> None:
+    """Scores of a lag may have either sign; where no few samples lead it begins there."""
+    log = drive(Model(car), manoeuvres.lap(20.0, 6.0), seed=31)
+    columns = {c: log[c][2:] for c in log.channels if c != "time_s"}
+    early = {**columns, "steer_rad": log["steer_rad"][:-2], "time_s": log["time_s"][2:]}
+    driving = Driving.of(Log.from_arrays(early, name="steering that is logged late"))
+    assert driving.samples < THINNED
+    fit = refine(Model(car), driving, first_guess(driving, car))
+    leads = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": -0.01})
+    found = refine_beside(leads, driving, fit, fit.log_likelihood - 1e5)
+    assert found is not None
+    assert "at bound" in str(found["steer_lag.time_constant_s"])
+    assert 0.0 < found["steer_lag.time_constant_s"].value < 1e-3

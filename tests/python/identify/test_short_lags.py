@@ -2,7 +2,17 @@
 
 import pytest
 
-from sysid_vehicle import Model, drive, effect, identify, manoeuvres
+from sysid_vehicle import (
+    Model,
+    define_effect,
+    drive,
+    effect,
+    forget_effect,
+    identify,
+    manoeuvres,
+    parameter,
+)
+from sysid_vehicle.identify import free_box
 
 
 @pytest.mark.parametrize(
@@ -18,3 +28,23 @@ def test_a_lag_below_a_tenth_of_its_usual_size(truth: Model, name: str, true_s: 
     assert found.note == ""
     assert abs(found.value - true_s) < 3.0 * found.std
     assert found.std < 0.25 * true_s
+
+
+@pytest.mark.parametrize(("typical", "bounds"), [(-2.0, (-5.0, 0.0)), (2.0, (-5.0, 5.0))])
+def test_only_what_cannot_be_negative_is_kept_from_zero(
+    truth: Model, typical: float, bounds: tuple[float, float]
+) -> None:
+    low, high = bounds
+    gain = parameter("gain", "N s/m", typical=typical, lower=low, upper=high)
+    steep = define_effect(
+        "steep",
+        title="a force that hardly begins",
+        parameters=[gain],
+        force_y=lambda d, p: p.gain**3 * d.v_y,
+    )
+    try:
+        assert steep.scored_at_typical
+        box = free_box(truth.add("steep"))
+        assert (box.lower[-1], box.upper[-1]) == bounds
+    finally:
+        forget_effect("steep")

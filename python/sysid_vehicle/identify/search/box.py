@@ -23,11 +23,12 @@ def free_box(model: Model) -> Box:
     bounds = np.array([model.bounds(n) for n in names])
     lower = bounds[:, 0].copy()
     for i, n in enumerate(names):
-        # A lag of exactly zero has no derivative.
+        # A lag of exactly zero has no derivative. What may have either sign passes through zero.
         part = next((e for e in model.parts if n.startswith(f"{e.id}.")), None)
-        if part is not None and part.scored_at_typical:
+        null = known[n].null_value
+        if part is not None and part.scored_at_typical and known[n].lower == null:
             least = _NEXT_TO_NONE if len(part.parameters) == 1 else _ONE_OF_SEVERAL
-            lower[i] = max(lower[i], least * known[n].typical)
+            lower[i] = max(lower[i], null + least * (known[n].typical - null))
     return Box([known[n].column for n in names], lower, bounds[:, 1])
 
 

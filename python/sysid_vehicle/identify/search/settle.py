@@ -135,7 +135,7 @@ def settle(
         # Few samples lead most of the way, unless where it begins is better already.
         led = settle(thin[-1], p, noise, box, thin=thin[:-1], method=method, rounds=rounds)[:2]
     if led is not None:
-        near, told = led
+        near, told = box.inside(led[0]), led[1]
         if objective.log_likelihood(near, told) > objective.log_likelihood(p, noise):
             p, noise, steps, followed = near, told, 3, True
     best = -np.inf
