@@ -15,10 +15,11 @@ from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Told
 from .._common.typed import typed
 from ..effects import channels_in_use, effect
-from ..errors import InvalidInput, NumericalError
+from ..errors import InvalidInput, NumericalError, warn
 from ..log import CHANNELS, MEASURED, Log
 from ..manoeuvres import Manoeuvre
 from ..model import Model
+from .beyond_grip import beyond_grip
 from .noise import RoadDisturbance, SensorNoise
 
 if TYPE_CHECKING:
@@ -239,8 +240,13 @@ def drive(
         whole number from zero up nor a generator.
     NumericalError
         If the car spun or stopped; the message names the time.
+
+    Warns
+    -----
+    SysidWarning
+        If the wheels of an axle brake or drive with more than their tyres hold.
     """
-    return drive_truth(
+    made = drive_truth(
         model,
         manoeuvre,
         seed=seed,
@@ -249,7 +255,11 @@ def drive(
         rate_hz=rate_hz,
         name=name,
         channels=channels,
-    ).log
+    )
+    beyond = beyond_grip(model, made.log["time_s"], made.inputs[:, 1], made.outputs[:, 3])
+    if beyond:
+        warn(f"{made.log.name}: {beyond}")
+    return made.log
 
 
 def _how_it_was_lost(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import manoeuvres
-from sysid_vehicle.errors import InvalidInput, NumericalError
+from sysid_vehicle.errors import InvalidInput, NumericalError, SysidWarning
 from sysid_vehicle.log import CHANNELS
 from sysid_vehicle.model import Model
 from sysid_vehicle.simulate import (
@@ -18,6 +18,8 @@ from sysid_vehicle.simulate import (
     drive_truth,
     example_vehicle,
 )
+from sysid_vehicle.tyre import Tyre
+from sysid_vehicle.vehicle import GRAVITY_MPS2
 
 # Sizes of hidden effects that every manoeuvre must survive.
 HIDDEN: dict[str, dict[str, float]] = {
@@ -271,3 +273,38 @@ def test_steering_acts_after_the_log_says_so_or_before(delay_s: float) -> None:
     else:
         np.testing.assert_array_equal(shifted.states, prompt.states)
         np.testing.assert_allclose(steer[3:], before[:-3], atol=1e-12)
+
+
+_ICE = Tyre(B=10.0, C=1.4, D=0.15, E=0.0)
+
+
+def test_brakes_that_ask_more_than_ice_holds_are_told() -> None:
+    car = example_vehicle().replace(tyre_front=_ICE, tyre_rear=_ICE, drive_front_share=0.5)
+    course = manoeuvres.straight_acceleration()
+    with pytest.warns(
+        SysidWarning, match=r"straight_acceleration: at t = .* front wheels brake"
+    ) as told:
+        drive(Model(car), course, seed=1, noise=SensorNoise.none())
+    said = re.search(
+        r"t = (\S+) s .* with (\S+) N, .* hold (\S+) N \(D_front = 0.15\)", str(told[0].message)
+    )
+    assert said is not None
+    at_s, force_n, held_n = map(float, said.groups())
+    found = drive_truth(Model(car), course, seed=1, noise=SensorNoise.none())
+    k = int(np.argmin(np.abs(found.log["time_s"] - at_s)))
+    assert force_n == pytest.approx(-car.brake_front_share * found.inputs[k, 1], rel=1e-3)
+    assert found.outputs[k, 3] < -0.15 * GRAVITY_MPS2
+    load = GRAVITY_MPS2 * (car.lr_m + 0.15 * car.cg_height_m)
+    assert held_n == pytest.approx(0.15 * car.mass_kg * load / car.wheelbase_m, rel=1e-3)
+
+
+def test_a_drive_axle_that_would_spin_is_told() -> None:
+    car = example_vehicle().replace(tyre_rear=Tyre(B=10.0, C=1.4, D=0.3, E=0.0))
+    with pytest.warns(SysidWarning, match=r"the rear wheels drive .* would spin"):
+        drive(Model(car), manoeuvres.straight_acceleration(), seed=1)
+
+
+@pytest.mark.parametrize("name", sorted(manoeuvres.all()))
+def test_no_manoeuvre_asks_a_dry_road_for_too_much(name: str) -> None:
+    """Warnings are errors here."""
+    drive(Model(example_vehicle()), manoeuvres.all()[name], seed=1)
