@@ -43,6 +43,37 @@ def test_the_wrong_driven_axle_is_named(start: Model, lap: Log) -> None:
     assert f"with drive_front_share = {start.vehicle.drive_front_share:g} the" in said
 
 
+@pytest.mark.parametrize("key", ["lf_m", "lr_m"])
+@pytest.mark.parametrize("names", [("aero_downforce", "steer_compliance"), ()])
+def test_the_wheelbase_in_place_of_a_length_is_named(
+    start: Model, lap: Log, key: str, names: tuple[str, ...]
+) -> None:
+    car = start.vehicle
+    final = found(start, lap, *names, **{key: car.wheelbase_m})
+    said = slip_of_the_file(final, names)
+    what = ", ".join(names) if names else "what is missing"
+    assert said.startswith(f"{what} may be a mistake in the vehicle file: with {key} = ")
+    assert f"{key} = {getattr(car, key):g} ({car.wheelbase_m:g} being the wheelbase) the" in said
+
+
+def test_a_car_with_its_mass_far_behind_is_no_slip(
+    start: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With one length of 1.7 times the other a search is made, which finds no other wheelbase."""
+    car = start.vehicle.replace(lf_m=1.64, lr_m=0.96)
+    tail = replace(start, vehicle=car)
+    final = found(tail, driven(tail, 411903))
+    asked: list[Fit] = []
+    searched = slip_of_the_file.__globals__["refine"]
+    monkeypatch.setitem(
+        slip_of_the_file.__globals__, "refine", lambda *a: asked.append(searched(*a)) or asked[-1]
+    )
+    assert slip_of_the_file(final, ()) == ""
+    assert len(asked) == 1
+    assert slip_of_the_file(replace(final, model=start), ()) == ""
+    assert len(asked) == 1
+
+
 def test_a_car_that_is_unlike_its_file_by_other_sizes_is_no_slip(
     start: Model, truth: Model
 ) -> None:

@@ -52,7 +52,7 @@ def one_for_all(
     str
         A sentence; empty where there is no such slip or effect.
     """
-    slip = slip_of_the_file(final, added)
+    slip = slip_of_the_file(final, added, rules)
     if slip:
         return slip
     if len(added) < 2:
