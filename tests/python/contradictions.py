@@ -10,6 +10,8 @@ _SLOW = "Too slow for a disturbance, so it has a cause"
 _SMALL = ("below the errors that", "below the noise of the sensors")
 _WHERE = "Next: where that matters to you"
 _MORE = "times the one that the training data predict"
+_OPEN = "with parameters that serve validation data too"
+_ROUNDED = 0.006  # of three digits
 _WHY = (
     "Other effects have absorbed what is missing",
     "There is evidence for",
@@ -50,6 +52,12 @@ def contradictions(text: str) -> list[str]:
         found.append("validation data err more than is foretold, and nothing is left")
     if _STILL in text and (_NONE in text or _DISTURBANCE in text):
         found.append("a function of the driving predicts what is left, and none does")
+    floors = re.search(r"validation error is ([0-9.]+) noise floors", text)
+    last = re.search(r"([0-9.]+)\n  noise floor  ", text)
+    if floors and last and abs(float(floors[1]) - float(last[1])) > _ROUNDED * float(last[1]):
+        found.append(f"a validation error of {floors[1]}, and of {last[1]} in the table")
+    if _OPEN in text and (_SOME in text or _MORE in text):
+        found.append("parameters explain what validation data err more, and something else does")
     if _DISTURBANCE in text and _SOME in text:
         found.append("what is left is disturbance, and depends on the driving")
     if re.search(r"explains? (-|nan)", text) or re.search(r"remove (-|nan)", text):

@@ -65,7 +65,7 @@ def test_a_gap_inside_a_log_is_no_turn_of_the_wheel(truth: Model) -> None:
 
 def test_it_speaks_plainly() -> None:
     assert str(Omnibus(40.0, 40, 0.47, "r")) == (
-        "no remaining error that depends on the driving (p = 0.47)"
+        "no remaining error that depends on the driving is shown (p = 0.47)"
     )
     assert str(Omnibus(400.0, 40, 1e-9, "F_x")) == (
         "an error that depends on the driving remains, mostly in F_x (p = 1e-09)"

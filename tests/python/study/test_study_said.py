@@ -3,7 +3,7 @@
 import pytest
 from contradictions import contradictions
 
-from sysid_vehicle import Model, drive, improve, manoeuvres
+from sysid_vehicle import Model, SysidWarning, drive, improve, manoeuvres
 
 
 @pytest.mark.manual
@@ -60,6 +60,22 @@ def test_driving_without_corners_tests_nothing_lateral(start: Model, truth: Mode
             ),
             "takes nothing off errors that fell",
         ),
+        (
+            (
+                "  baseline              1.028             1.643\n"
+                "  noise floor           1.000             1.000\n"
+                "The validation error is 1.38 noise floors, and 1.05 with parameters that"
+            ),
+            "a validation error of 1.38, and of 1.643 in the table",
+        ),
+        (
+            (
+                "On all data together: an error that depends on the driving remains. The "
+                "validation error is 1.38 noise floors, and 1.05 with parameters that serve "
+                "validation data too"
+            ),
+            "and something else does",
+        ),
     ],
 )
 def test_statements_that_contradict_each_other_are_seen(text: str, said: str) -> None:
@@ -92,3 +108,24 @@ def test_at_ten_hertz_what_cannot_be_told_apart_is_named_together(truth: Model) 
     delays = [c.delay for c in found.where.coherence]
     assert not any(d.significant for d in delays if d is not None)
     assert not any("answers" in line for _, lines in found.where_lines for line in lines)
+
+
+def test_an_error_that_tests_do_not_see_has_a_reason(start: Model) -> None:
+    """The tests ask whether any parameters serve all data; the table has those of training data."""
+    car = start.vehicle
+    assert car.drive_front_share < 0.5
+    wrong = Model(car.replace(drive_front_share=1.0))
+    with pytest.warns(SysidWarning, match="mistake in the vehicle file"):
+        found = improve(
+            wrong,
+            drive(Model(car), manoeuvres.constant_radius(), seed=77320, rate_hz=50.0),
+            drive(Model(car), manoeuvres.handling_course(), seed=77321, rate_hz=50.0),
+            candidates=["force_split"],
+            starts=1,
+            sensors=False,
+        )
+    assert found.test[-1].error > 1.2
+    said = found.in_the_end
+    assert "no remaining error that depends on the driving is shown" in said
+    assert f"The validation error is {found.test[-1].error:.3g} noise floors, and 1.0" in said
+    assert contradictions(str(found)) == []

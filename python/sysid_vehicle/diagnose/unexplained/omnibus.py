@@ -73,7 +73,8 @@ class Omnibus:
 
     def __str__(self) -> str:
         if not self.rejects:
-            return f"no remaining error that depends on the driving (p = {self.p_value:.2g})"
+            none = "no remaining error that depends on the driving is shown"
+            return f"{none} (p = {self.p_value:.2g})"
         return (
             f"an error that depends on the driving remains, mostly in {self.strongest} "
             f"(p = {self.p_value:.2g})"

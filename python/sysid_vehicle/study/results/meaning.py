@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from ..._common.text import few
-from ...rules import NONE_GONE, share_of
+from ...rules import NONE_GONE
 from .sentences import (
     disturbance,
     elsewhere,
@@ -15,6 +14,7 @@ from .sentences import (
     share_beyond_noise,
     slow,
     structured,
+    undetermined,
 )
 
 if TYPE_CHECKING:
@@ -104,18 +104,16 @@ def _adequate(study: Study) -> str:
         helps = study.predicting is not None and study.predicting.helps
         how = " with parameters fitted to predictions (`study.predicting.final`)" if helps else ""
         return f"an error remains, but 0.5 to 5 s ahead it is below {_matters(study)}{how}"
-    error, most = study.test[-1].error, study.rules.explainable
-    if study.foretold is None or not share_beyond_noise(error) > most:
+    told = undetermined(study)
+    if told:
+        return f"{_COMPLETE}; {told}; add such driving to them"
+    error = study.test[-1].error
+    if study.foretold is None or not share_beyond_noise(error) > study.rules.explainable:
         return _COMPLETE
-    told = f"{_COMPLETE}; the validation error is {error:.2g} noise floors"
-    serving = study.foretold.error
-    known = math.isfinite(serving)
-    if known and (share_beyond_noise(serving) <= most or share_of(error**2, serving**2) > most):
-        return (
-            f"{told}, and {serving:.2g} with parameters that serve validation data too: the "
-            "training data do not determine the tyres where these drive; add such driving to them"
-        )
-    return f"{told}, from disturbances like those of the training data"
+    return (
+        f"{_COMPLETE}; the validation error is {error:.3g} noise floors, from disturbances like "
+        "those of the training data"
+    )
 
 
 def _named(study: Study) -> str:

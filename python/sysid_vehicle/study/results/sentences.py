@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -225,12 +226,35 @@ def _on_all(study: Study) -> list[str]:
         if not _more(study):
             found = f"no more than a disturbance can cause (p = {beyond.p_value:.2g})"
         said.append(f"On all data together: {found if beyond.rejects else beyond}.")
+    none = not (elsewhere(study) or study.omnibus.rejects)
+    if none and study.verdict not in ("adequate", "not_testable") and undetermined(study):
+        said.append(f"{undetermined(study).capitalize()}.")
     if _unforeseen(study):
         said.append(f"{str(study.foretold).capitalize()}.")
     if slow(study):
         some = " and a ".join(study.slow)
         said.append(f"Too slow for a disturbance, so it has a cause: a {some}.")
     return said
+
+
+def undetermined(study: Study) -> str:
+    """Say that validation data err by parameters that training data leave open; else empty.
+
+    What tests them asks whether any parameters serve both.
+    """
+    error, most = study.test[-1].error, study.rules.explainable
+    if study.foretold is None or not share_beyond_noise(error) > most:
+        return ""
+    serving = study.foretold.error
+    if not math.isfinite(serving):
+        return ""
+    if share_beyond_noise(serving) > most and not share_of(error**2, serving**2) > most:
+        return ""
+    what = "the parameters" if study.added else "the tyres"
+    return (
+        f"the validation error is {error:.3g} noise floors, and {serving:.3g} with parameters that "
+        f"serve validation data too: the training data do not determine {what} where these drive"
+    )
 
 
 def elsewhere(study: Study) -> bool:
