@@ -93,11 +93,12 @@ def read_log(
     else:
         mapping = ChannelMap.from_toml(channels)
     is_path = isinstance(source, (str, Path))
-    run = name if name is not None else as_path(source).stem if is_path else "log"
-    entry = recognised(as_path(source)) if is_path else None
+    path = as_path(source) if is_path else None
+    run = name if name is not None else "log" if path is None else path.stem
+    entry = None if path is None else recognised(path)
     notes: list[str] = []
     try:
-        with blamed(entry, source if is_path else run):
+        with blamed(entry, run if path is None else path):
             table = contents(source, dbc, entry)
             if isinstance(table, Recording):
                 table = mapping.rows_of(table, notes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -204,8 +205,9 @@ def blamed(entry: Format | None, path: object) -> Iterator[None]:
         if entry is None:
             raise
         reader = f"{entry.libraries[0]} cannot read it" if entry.libraries else "it is broken"
+        told = str(error).replace(f"{path}{os.sep}", "")  # files of a folder that is named already
         raise InvalidInput(
-            f"{path}: is {entry.what}, but {reader} ({type(error).__name__}: {error}); {entry.mend}"
+            f"{path}: is {entry.what}, but {reader} ({type(error).__name__}: {told}); {entry.mend}"
         ) from error
 
 

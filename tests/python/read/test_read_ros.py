@@ -2,6 +2,8 @@
 
 import importlib
 import json
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ from log_formats import FAST, SLOW
 
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.log import Log
-from sysid_vehicle.read import read_log
+from sysid_vehicle.read import propose_channels, read_log
 
 pytestmark = pytest.mark.filterwarnings(
     # What the libraries say of themselves and of each other.
@@ -180,3 +182,26 @@ def write_bag(path: Path, ros: int, messages: list[tuple[str, int, dict[str, Any
             serialize = store.serialize_ros1 if ros == 1 else store.serialize_cdr
             writer.write(connections[topic], ns, serialize(content, kinds[topic]))
     return path
+
+
+_BROKEN = {
+    "no text of its own": "x: [",
+    "a file that is not there": (
+        "rosbag2_bagfile_information: {relative_file_paths: [a.mcap], storage_identifier: mcap, "
+        "version: 5}"
+    ),
+}
+
+
+@pytest.mark.parametrize("metadata", [*_BROKEN.values(), None], ids=[*_BROKEN, "none"])
+@pytest.mark.parametrize("read", [read_log, propose_channels])
+def test_a_folder_that_is_no_bag_is_named_once(
+    tmp_path: Path, metadata: str | None, read: Callable[[str], object]
+) -> None:
+    pytest.importorskip("rosbags")
+    if metadata is not None:
+        (tmp_path / "metadata.yaml").write_text(metadata)
+    with pytest.raises(InvalidInput) as told:
+        read(f"{tmp_path}{os.sep}")
+    assert f"{tmp_path}: is a " in str(told.value)
+    assert str(told.value).count(str(tmp_path)) == 1

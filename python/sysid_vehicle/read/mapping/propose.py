@@ -78,7 +78,7 @@ def propose_channels(
         source = {name: source[name] for name in source.channels}
     is_path = isinstance(source, (str, Path))
     entry = recognised(as_path(source)) if is_path else None
-    with blamed(entry, source if is_path else "log"):
+    with blamed(entry, as_path(source) if is_path else "log"):
         try:
             held = contents(source, dbc, entry)
         except InvalidInput as error:
