@@ -10,7 +10,7 @@ from .laws import Drive, Implausible, cosine
 WITH_THE_CAR = (0.8, 1.25)
 """Turns of the direction of motion for each of the car; those of the sideslip are far fewer."""
 
-_LEAST_RADPS = 0.03  # of the yaw rate, root mean square
+LEAST_RADPS = 0.03  # of the yaw rate, root mean square
 _USUAL = 90.0  # percentile of the yaw rates
 _CLOSELY = 0.9  # cosine from which both turns go together
 
@@ -30,7 +30,7 @@ def check_over_ground(drive: Drive) -> None:
     usual = np.abs(rate) <= np.percentile(np.abs(rate), _USUAL)
     place, turns, rate = drive.place(rate), turns[usual], rate[usual]
     square = float(rate @ rate)
-    if square < _LEAST_RADPS**2 * rate.size or abs(cosine(turns, rate)) < _CLOSELY:
+    if square < LEAST_RADPS**2 * rate.size or abs(cosine(turns, rate)) < _CLOSELY:
         return
     if WITH_THE_CAR[0] < abs(float(turns @ rate)) / square < WITH_THE_CAR[1]:
         raise Implausible(

@@ -51,6 +51,7 @@ from .motion import Motion
 from .over_ground import check_over_ground
 from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
 from .regression import in_most, size_of
+from .swapped_speeds import check_swapped_speeds
 from .wheelbase import check_steering, gripping, is_model_car
 
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
@@ -120,6 +121,7 @@ def check_coherence(
     given, columns = columns, blank(columns, lost)
     motion = Motion(columns, rate_hz)
     motion.windows(WINDOW_S)
+    check_swapped_speeds(motion)
     speed = motion.mean(motion.channels["vx_mps"])
     # In whatever unit it has.
     rows = motion.usable & (np.abs(speed) > least_speed_mps(np.abs(speed)))
