@@ -21,8 +21,9 @@ from ..._common.text import (
 )
 from ..search.objective import Objective
 from ..search.search import Box
-from .profile import Optimum, Profile, profile_all
+from .profile import Profile, profile_all
 from .quantities import Quantity
+from .side import Optimum
 
 BETTER_FOUND = 4
 """Times that profiling may lead to a better optimum."""

@@ -9,7 +9,8 @@ import numpy as np
 from ..._common.text import number
 from ..._common.typed import typed
 from ...errors import InvalidInput, near_names
-from ...identify.intervals.profile import LEVEL, Optimum, lost_at
+from ...identify.intervals.profile import lost_at
+from ...identify.intervals.side import LEVEL, Optimum
 from .fit import TyreFit
 from .problem import box_of, objective_of
 
