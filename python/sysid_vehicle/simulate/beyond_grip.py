@@ -7,47 +7,64 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._common.arrays import FloatArray
+from .._common.arrays import FloatArray, as_float64
 from ..model import Model
 from ..vehicle import AXLES, GRAVITY_MPS2
 
+_LOADS = slice(7, 9)  # among what the compiled model evaluates
 
-def beyond_grip(
-    model: Model, time_s: FloatArray, force_n: FloatArray, accelerations_mps2: FloatArray
-) -> str:
+
+def beyond_grip(model: Model, time_s: FloatArray, inputs: FloatArray, motion: FloatArray) -> str:
     """Say where, and how far, wheel forces go beyond D times the load of an axle.
 
-    The load is that of a rigid car on a level road, with the transfer by the longitudinal
-    acceleration as far as tyres can bring it about (Gillespie, Fundamentals of Vehicle Dynamics,
-    ch. 1), whatever the model has of it. Downforce, and grip that changes, are not counted.
+    The load is that of the model, downforce included, with the transfer by no more force than all
+    tyres hold together. Grip that changes on the way is not counted.
 
     Parameters
     ----------
     model : Model
-    time_s, force_n, accelerations_mps2 : array, shape (n,)
-        Time of the samples, total wheel force, and longitudinal acceleration.
+    time_s : array, shape (n,)
+    inputs : array, shape (n, 2)
+        Steering angle and total wheel force.
+    motion : array, shape (n, 3)
+        v_x, v_y and yaw rate.
 
     Returns
     -------
     str
         Empty where no axle is asked for more.
     """
-    car = model.vehicle
+    car, force_n = model.vehicle, inputs[:, 1]
     front = np.where(force_n < 0.0, car.brake_front_share, car.drive_front_share)
     forces = np.abs([front * force_n, (1.0 - front) * force_n])
     peaks = np.array([[model.value(f"D_{axle}")] for axle in AXLES])
-    most_mps2 = GRAVITY_MPS2 * float(peaks.max())
-    transfer = car.cg_height_m * np.clip(accelerations_mps2, -most_mps2, most_mps2)
-    arms = [GRAVITY_MPS2 * car.lr_m - transfer, GRAVITY_MPS2 * car.lf_m + transfer]
-    held = peaks * car.mass_kg * np.maximum(arms, 0.0) / car.wheelbase_m
-    excess = forces / np.maximum(held, 1.0)
-    if not np.any(excess > 1.0):
+    # An axle carries half of the car or so: half of that is not worth a closer look.
+    weight_n = car.mass_kg * GRAVITY_MPS2
+    near = np.flatnonzero(np.any(forces > 0.25 * peaks * weight_n, axis=0))
+    if not near.size:
         return ""
+    held = peaks * _loads(model, inputs[near], motion[near], float(peaks.max()))
+    held[np.isnan(held)] = np.inf  # an effect reads a column that one evaluation has none of
+    excess = forces[:, near] / np.maximum(held, 1.0)
     row, k = np.unravel_index(int(np.argmax(excess)), excess.shape)
-    axle, force, most = AXLES[row], forces[row, k], held[row, k]
-    does, would = ("brake", "lock") if force_n[k] < 0.0 else ("drive", "spin")
+    if not excess[row, k] > 1.0:
+        return ""
+    axle, at = AXLES[row], near[k]
+    does, would = ("brake", "lock") if force_n[at] < 0.0 else ("drive", "spin")
     return (
-        f"at t = {time_s[k]:.5g} s the {axle} wheels {does} with {force:.4g} N, and their tyres "
-        f"hold {most:.4g} N (D_{axle} = {peaks[row, 0]:.3g}): those of a car would {would}, in the "
-        "single-track model they do not; ask for less speed, or for changes of it that take longer"
+        f"at t = {time_s[at]:.5g} s the {axle} wheels {does} with {forces[row, at]:.4g} N, and "
+        f"their tyres hold {held[row, k]:.4g} N (D_{axle} = {peaks[row, 0]:.3g}): those of a car "
+        f"would {would}, in the single-track model they do not; ask for less speed, or for changes "
+        "of it that take longer"
     )
+
+
+def _loads(model: Model, inputs: FloatArray, motion: FloatArray, peak: float) -> FloatArray:
+    """Loads of the front and the rear axle, shape (2, n)."""
+    core, p = model.core(), model.vector()
+    loads = np.empty((2, len(inputs)))
+    for k, ((steer, force), moving) in enumerate(zip(inputs, motion, strict=True)):
+        coasting = core.evaluate(p, moving, steer, 0.0)[0, _LOADS]
+        most = peak * float(coasting.sum())
+        loads[:, k] = core.evaluate(p, moving, steer, float(np.clip(force, -most, most)))[0, _LOADS]
+    return as_float64(loads)

@@ -256,7 +256,7 @@ def drive(
         name=name,
         channels=channels,
     )
-    beyond = beyond_grip(model, made.log["time_s"], made.inputs[:, 1], made.outputs[:, 3])
+    beyond = beyond_grip(model, made.log["time_s"], made.inputs, made.states)
     if beyond:
         warn(f"{made.log.name}: {beyond}")
     return made.log
