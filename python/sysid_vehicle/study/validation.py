@@ -84,6 +84,12 @@ def _driven_alike(train: Sequence[Log], test: Sequence[Log]) -> tuple[Driving, D
     return Driving.of(own), Driving.of(without_unlearned(others, own))
 
 
+def together(train: Driving, test: Driving) -> Driving:
+    """Training and validation data as one; a log that is both counts once."""
+    own = (log for log in test.each_log() if not copies(log.logs, train.logs))
+    return Driving.joined((train, *own))
+
+
 def gain_in_log_likelihood(
     poorer: Fit, richer: Fit, test: Driving, *, same_noise: bool = False
 ) -> Gain:

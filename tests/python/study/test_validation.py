@@ -13,7 +13,7 @@ from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.estimate import MEASURED, Driving
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.ahead.beyond import Beyond
-from sysid_vehicle.study.validation import _with_error, set_aside
+from sysid_vehicle.study.validation import _with_error, set_aside, together
 
 
 @pytest.mark.parametrize("length_s", [60.0, 3.0])
@@ -147,6 +147,14 @@ def test_a_log_that_is_in_training_and_validation_data_is_noticed(
         set_aside([lap, course], again)
     changed = altered(lap, vx_mps=lap["vx_mps"] + 1e-9)
     assert [d.logs[0].name for d in set_aside(lap, changed)] == ["lap", "lap"]
+
+
+def test_a_log_that_is_both_counts_once_on_all_data(lap: Log, course: Log) -> None:
+    """Twice its evidence would say that something is left of a model that is the car."""
+    again = Log.from_arrays({c: lap[c] for c in lap}, name="again")
+    every = together(Driving.of(lap), Driving.of([again, course]))
+    assert [log.name for log in every.logs] == [lap.name, course.name]
+    assert together(Driving.of(lap), Driving.of(lap)).samples == Driving.of(lap).samples
 
 
 def test_channels_whose_noise_was_not_learned_are_left_out_of_validation_data(

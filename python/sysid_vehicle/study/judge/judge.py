@@ -37,7 +37,7 @@ from ..search.search import Trail
 from ..search.steps import insignificant, way
 from ..search.together import in_place_of
 from ..study import Study
-from ..validation import at_its_best, beyond_noise_ahead, serving
+from ..validation import at_its_best, beyond_noise_ahead, serving, together
 from .answers import answers_of
 from .contested import spoken_against
 from .foretold import foretold
@@ -243,7 +243,7 @@ class Judge:
 
     def _rivals(self) -> Instead:
         both = serving(self.fit, self.test)
-        everywhere = Driving.joined((self.fit.driving, driving_of(both, self.test)))
+        everywhere = together(self.fit.driving, driving_of(both, self.test))
         return instead(both, everywhere, self.added, self.rules)
 
     def _alone(self, rivals: Instead | None) -> Verdicts:
