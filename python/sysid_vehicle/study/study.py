@@ -40,6 +40,7 @@ from .ahead.horizons import Horizons, horizons
 from .ahead.shares import Shares, shares
 from .ahead.waterfall import Waterfall, waterfall
 from .judge.answers import Answers
+from .judge.between_logs import told_differently
 from .judge.disagree import Disagreement, disagreements
 from .judge.foretold import Foretold
 from .judge.structure import Structure
@@ -290,19 +291,18 @@ class Study:
         return disagreements(self.fit, self.validation, self.rules)
 
     @cached_property
-    def small(self) -> bool:
-        """Whether something is missing of which no error 0.5 to 5 s ahead exceeds the usual sizes.
+    def between_logs(self) -> list[str]:
+        """What training logs tell differently, in words, if something is left; some seconds."""
+        return told_differently(self.fit, self.rules) if self.verdict in LACKING else []
 
-        Some seconds at first.
-        """
+    @cached_property
+    def small(self) -> bool:
+        """Whether errors 0.5 to 5 s ahead of what is missing are below usual ones; some seconds."""
         return self.verdict == "unknown" and small(self)
 
     @cached_property
     def predicting(self) -> Predicting | None:
-        """First and last model fitted to predictions of 2 s, seconds at first.
-
-        None where the driving is too short.
-        """
+        """First and last model fitted to predictions of 2 s; None if the driving is too short."""
         return predicting(self)
 
     def in_time(self, seconds: float, *, reported: bool = True) -> Study:

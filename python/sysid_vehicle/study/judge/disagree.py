@@ -19,7 +19,7 @@ from ...estimate import Driving
 from ...identify import Estimate, Fit, driving_of, refine
 from ...rules import USUAL, Rules
 
-_STIFFNESS = ("cornering stiffness front", "cornering stiffness rear")
+STIFFNESS = ("cornering stiffness front", "cornering stiffness rear")
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def disagreements(fit: Fit, test: Driving, rules: Rules = USUAL) -> tuple[Disagr
     told = {e.name for e in (*fit.estimates, *fit.derived)}
     # Offsets differ from log to log, and tell nothing of the car.
     own = {e.id for e in fit.model.parts} - set(fit.model.nuisances)
-    names = [n for n in _STIFFNESS if n in told]
+    names = [n for n in STIFFNESS if n in told]
     names += [e.name for e in fit.estimates if e.name.split(".")[0] in own]
     found = (Disagreement(fit[n], other[n]) for n in names)
     return tuple(

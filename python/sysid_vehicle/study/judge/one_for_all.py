@@ -18,6 +18,7 @@ from ...errors import NumericalError
 from ...identify import Fit, refine
 from ...rules import Rules
 from ..search.steps import merit
+from .between_logs import no_effect_but_the_log
 from .slip_of_the_file import slip_of_the_file
 
 _IN_THE_FILE = {
@@ -32,7 +33,7 @@ _IN_THE_FILE = {
 def one_for_all(
     baseline: Fit, final: Fit, added: Sequence[str], sought: Collection[str], rules: Rules
 ) -> str:
-    """Say which slip of the vehicle file, or effect that was not sought, explains what was added.
+    """Say which slip of the vehicle file, difference of logs, or other effect explains all of it.
 
     An effect that was left out, or is fixed, and is refitted in the place of all that were added
     has to be as likely on the training data by the BIC, which its fewer parameters may let it be,
@@ -50,9 +51,11 @@ def one_for_all(
     Returns
     -------
     str
-        A sentence; empty where there is no such slip or effect.
+        A sentence; empty where there is no such slip or effect, and the logs tell one car.
     """
     slip = slip_of_the_file(final, added, rules)
+    if not slip:
+        slip = no_effect_but_the_log(baseline, final, added, rules)
     if slip:
         return slip
     if len(added) < 2:

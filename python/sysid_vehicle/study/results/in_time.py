@@ -49,6 +49,7 @@ _PARTS = {
     "shares": _Part("how much of the errors ahead could be explained", _nothing),
     "predicting": _Part("what a fit to predictions gains", lambda _: None),
     "disagreements": _Part("which parameters validation data give differently", lambda _: ()),
+    "between_logs": _Part("which parameters training logs give differently", lambda _: []),
     "small": _Part("whether the errors of the baseline matter", lambda _: False),
     "where": _Part("moments at which the car changed, and delays", _without_causes),
     "unknown": _Part("the shape of what is missing", lambda _: None),

@@ -174,6 +174,12 @@ def _of_sensors(study: Study) -> list[str]:
 
 def _of_driving(study: Study) -> list[str]:
     found = []
+    by_log = "; ".join(study.between_logs[:_SHOWN])
+    if by_log:
+        found.append(
+            "find out what differs between the training logs (tyres, load, road, sensors): "
+            f"{by_log}; `sv.changed` compares two of them"
+        )
     apart = "; ".join(str(d) for d in study.disagreements[:_SHOWN])
     if apart:
         found.append(

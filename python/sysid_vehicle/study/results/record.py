@@ -66,6 +66,7 @@ def record(study: Study) -> dict[str, Any]:
         "parameters": {e.name: e.to_dict() for e in study.estimates},
         "predicting": None if study.predicting is None else study.predicting.to_dict(),
         "disagreements": [d.to_dict() for d in study.disagreements],
+        "between_logs": study.between_logs,
         "warnings": list(study.warnings),
         "left_out": list(study.left_out.values()),
         "next_steps": list(study.next_steps),

@@ -1,0 +1,69 @@
+"""Training logs of a car that was not the same in all of them."""
+
+from dataclasses import replace
+
+import pytest
+
+from sysid_vehicle import Fit, Log, Model, drive, identify, manoeuvres
+from sysid_vehicle.identify import refine
+from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study.judge.between_logs import no_effect_but_the_log, told_differently
+from sysid_vehicle.study.judge.one_for_all import one_for_all
+
+
+def laps(*cars: Model) -> list[Log]:
+    """Laps of 30 s, each by another car."""
+    lap = manoeuvres.lap(30.0)
+    return [
+        drive(car, lap, seed=662900 + i, rate_hz=50.0, name=f"set {i + 1}")
+        for i, car in enumerate(cars)
+    ]
+
+
+@pytest.fixture(scope="module")
+def softer(truth: Model) -> Model:
+    """The same car on front tyres 25 % softer."""
+    car = truth.vehicle
+    front = replace(car.tyre_front, B=0.75 * car.tyre_front.B)
+    return Model(car.replace(tyre_front=front))
+
+
+@pytest.fixture(scope="module")
+def two_sets(start: Model, truth: Model, softer: Model) -> Fit:
+    return identify(start, laps(truth, softer), starts=1)
+
+
+@pytest.fixture(scope="module")
+def one_set(start: Model, truth: Model) -> Fit:
+    return identify(start, laps(truth, truth), starts=1)
+
+
+def test_other_tyres_in_one_of_the_logs_are_told(two_sets: Fit, one_set: Fit) -> None:
+    (first, *_) = told_differently(two_sets)
+    assert first.startswith("cornering stiffness front ")
+    assert " N/rad from set 1, " in first
+    assert first.endswith(" from set 2")
+    assert told_differently(one_set) == []
+
+
+def test_what_an_effect_of_the_log_stands_in_for_is_told(two_sets: Fit) -> None:
+    heat = two_sets.model.add("tyre_temperature")
+    final = refine(heat, two_sets.driving, two_sets.noise)
+    assert final.log_likelihood > two_sets.log_likelihood + 50.0
+    said = one_for_all(two_sets, final, ("tyre_temperature",), (), USUAL)
+    assert said.startswith("tyre_temperature may be what differs between the training logs")
+    assert "(cornering stiffness front " in said
+
+
+def test_an_effect_that_acts_in_each_log_is_none_of_them(start: Model, truth: Model) -> None:
+    lagging = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.06})
+    fit = identify(start, laps(lagging, lagging), starts=1)
+    final = refine(fit.model.add("steer_lag"), fit.driving, fit.noise)
+    assert no_effect_but_the_log(fit, final, ("steer_lag",)) == ""
+    assert told_differently(final) == []
+
+
+def test_short_logs_and_single_ones_tell_no_car(start: Model, truth: Model, softer: Model) -> None:
+    pieces = [log.between(0.0, 12.0) for log in laps(truth, softer)]
+    assert told_differently(identify(start, pieces, starts=1)) == []
+    assert told_differently(identify(start, laps(truth), starts=1)) == []
