@@ -138,3 +138,17 @@ def test_a_group_is_off_nothing_where_one_of_it_is() -> None:
     assert named("lag", "delay") == ("lag", "delay")
     assert named("delay") == ("lag", "delay")
     assert not named()
+
+
+def test_a_change_by_other_names_does_not_speak_against_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Both axles softer and the front one back is the rear axle softer, for one change more."""
+    front, rear, both = "tyre_front", "tyre_rear", "stiffness_both_axles"
+    put = {(): -430.0, (rear,): 0.0, (front, both): -2.3, (front, "mass"): -9.0}
+    search = searching(monkeypatch, dict.fromkeys((front, rear, both, "mass"), 0.0), put)
+    lacking = search.lacking(rear, search.visited[frozenset({rear})], (rear,))
+    assert [s.put for s in lacking] == [(), (front, "mass")]
+    # Against all else it speaks as ever.
+    state = search.visited[frozenset({front, both})]
+    assert [s.put for s in search.lacking("mass", state, ())] == [(front, both)]

@@ -8,6 +8,7 @@ is no more than other tyres, so that no model of the catalogue has it.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,6 +68,15 @@ def _effect(of: str) -> Effect:
 
 SCALINGS = tuple(_effect(of) for of in _POWERS)
 """Effects that multiply tyres; the compiled model does not know them (`Scaled` does)."""
+
+
+def hold_tyres(put: Collection[str], axle: str) -> bool:
+    """Whether changes hold one of the tyres of an axle, `tyre_rear` say, by other names.
+
+    What changed both axles and was taken back at the other one changed this one.
+    """
+    other = {f"tyre_{a}" for a in AXLES} - {axle}
+    return len(other) < len(AXLES) and other <= {*put} and not _POWERS.keys().isdisjoint(put)
 
 
 def _scalings_of(model: Model) -> list[Effect]:

@@ -18,7 +18,7 @@ from ...vehicle import AXLES, GRAVITY_MPS2
 from ..candidates.clocks import CLOCKS
 from ..candidates.possible import considered
 from .beside_reference import Differences, Side
-from .both_axles import SCALINGS, factors, moves, without
+from .both_axles import SCALINGS, factors, hold_tyres, moves, without
 from .changes_compete import Competition
 from .may_change import (
     PAYLOAD,
@@ -348,7 +348,7 @@ class Search:
         """What was fitted, to its maximum, without an effect and all of its group.
 
         Nothing at all is among it, and what was put in without this change; what has another effect
-        in its place is not, as `odds` knows that.
+        in its place is not, as `odds` knows that, nor what holds it by other names.
         """
         put, rest = frozenset(state.put), frozenset(state.put) - {effect}
         without = put - {e for several in as_one(state.put) if effect in several for e in several}
@@ -357,6 +357,7 @@ class Search:
             for key, s in self.visited.items()
             if (s.climbed or key == without)
             and key.isdisjoint((effect, *group))
+            and not hold_tyres(key, effect)
             and not (rest < key and len(key) == len(put))
         ]
 
