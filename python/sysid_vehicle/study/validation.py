@@ -74,14 +74,18 @@ def _driven_alike(train: Sequence[Log], test: Sequence[Log]) -> tuple[Driving, D
 
     A log that is on both sides is told. Channels that training data lack are left out.
     """
-    both = copies(test, train)
-    if both:
-        warn(
-            f"{few(both)} is training and validation data; the validation error then proves nothing"
-        )
+    for text in twice(train, test):
+        warn(text)
     logs = alike_in_force((*train, *test))
     own, others = logs[: len(train)], logs[len(train) :]
     return Driving.of(own), Driving.of(without_unlearned(others, own))
+
+
+def twice(train: Sequence[Log], test: Sequence[Log]) -> list[str]:
+    """What is to be said of logs that are both training and validation data."""
+    both = copies(test, train)
+    told = "training and validation data; the validation error then proves nothing"
+    return [f"{few(both)} {'is' if len(both) == 1 else 'are'} {told}"] if both else []
 
 
 def together(train: Driving, test: Driving) -> Driving:

@@ -128,7 +128,7 @@ def test_an_effect_with_which_errors_are_larger_where_it_acts_is_taken_out(
     assert trail.fit.model.effects == ("aero_drag",)
     assert trail.diagnoses[-1].fit is trail.fit
     assert trail.harmful == ("head_wind",)
-    (said,) = (text for text in _warnings(trail, ()) if "removed again" in text)
+    (said,) = (text for text in _warnings(trail, (), baseline.driving) if "removed again" in text)
     assert said.startswith("head_wind removed again: where such an effect acts, errors 1 to 5 s")
     # Where nothing is left shares are noise.
     complete = replace(dx, omnibus=replace(dx.omnibus, p_value=0.5))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, Log
+from sysid_vehicle import Fit, Log, Model, improve
 from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.estimate import MEASURED, Driving
@@ -155,6 +155,18 @@ def test_a_log_that_is_both_counts_once_on_all_data(lap: Log, course: Log) -> No
     every = together(Driving.of(lap), Driving.of([again, course]))
     assert [log.name for log in every.logs] == [lap.name, course.name]
     assert together(Driving.of(lap), Driving.of(lap)).samples == Driving.of(lap).samples
+
+
+def test_validation_data_that_are_training_data_are_among_the_warnings(
+    start: Model, lap: Log
+) -> None:
+    """A study that is printed or loaded later says so too."""
+    one = lap.between(0.0, 25.0)
+    told = f"{one.name} is training and validation data; the validation error then proves nothing"
+    with pytest.warns(SysidWarning, match="is training and validation data"):
+        found = improve(start, one, one, starts=1, most_effects=0, sensors=False)
+    assert found.warnings[0] == told
+    assert f"Warning: {told}" in str(found)
 
 
 def test_channels_whose_noise_was_not_learned_are_left_out_of_validation_data(

@@ -37,7 +37,7 @@ from ..search.search import Trail
 from ..search.steps import insignificant, way
 from ..search.together import in_place_of
 from ..study import Study
-from ..validation import at_its_best, beyond_noise_ahead, serving, together
+from ..validation import at_its_best, beyond_noise_ahead, serving, together, twice
 from .answers import answers_of
 from .contested import spoken_against
 from .foretold import foretold
@@ -191,7 +191,7 @@ class Judge:
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,
-            warnings=_warnings(self.trail, late, rules, one),
+            warnings=_warnings(self.trail, late, self.test, rules, one),
             seconds=time.perf_counter() - began,
             rules=rules,
             explained=explained,
@@ -332,10 +332,10 @@ class Judge:
 
 
 def _warnings(
-    trail: Trail, late: Sequence[str], rules: Rules = USUAL, one: str = ""
+    trail: Trail, late: Sequence[str], test: Driving, rules: Rules = USUAL, one: str = ""
 ) -> tuple[str, ...]:
-    fit, found = trail.fit, []
-    driving = fit.driving
+    fit, driving = trail.fit, trail.fit.driving
+    found = twice(driving.logs, test.logs)
     if one:
         found.append(one)
         warn(one)
