@@ -267,7 +267,8 @@ class Fleet:
         ended = ", ".join(
             f"{verdicts.count(v)} {v.replace('_', ' ')}" for v in dict.fromkeys(verdicts)
         )
-        said = f"{len(self.done)} studies of {len(self.cars)} cars"
+        done, cars = len(self.done), len(self.cars)
+        said = f"{done} {'study' if done == 1 else 'studies'} of {cars} car{'s' * (cars != 1)}"
         return (
             said
             + (f": {ended}" if ended else "")

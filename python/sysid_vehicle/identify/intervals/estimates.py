@@ -199,7 +199,7 @@ class Estimated(ABC):
 
     @property
     def by_noise(self) -> FloatArray:
-        """The covariance by noise alone, the inverse of the information."""
+        """The covariance by noise alone, not by times that were put right."""
         return self.covariance
 
     @property
