@@ -2,6 +2,7 @@
 
     python benchmarks/ladder [--seeds 2] [--first 3000] [--truth relaxation] [--pairs] [RUNG ...]
     python benchmarks/ladder --low-pass [--seeds 2] [--first 3000] [RUNG ...]
+    python benchmarks/ladder --right-model [--seeds 2] [--first 3000] [--truth sensitivity]
 
 Laps are fitted, handling courses judge. One imperfection at a time, or each pair (`--pairs`):
 forces of the road over 0.3 s (`pushes`) and over 0.03 s (`bumps`), a road that leans by 1.5 deg rms
@@ -14,7 +15,8 @@ of which the study says that this driving cannot tell it from the truth, inside 
 too), the verdict, and the median errors of v_y and yaw rate 2 and 5 s ahead on validation data,
 before and after.
 `--low-pass` asks, in seconds, only for the delay of the sensors' low-pass that their noise tells,
-beside the true one.
+beside the true one. `--right-model` asks only how errors of what is hidden compare with their
+standard errors, where the right model is fitted to the laps as they are.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ import time
 import warnings
 from collections.abc import Mapping
 
+import numpy as np
 from rungs import PAIRS, RUNGS, TRUTHS, low_pass_s, present, ride
 
 import sysid_vehicle as sv
@@ -48,9 +51,10 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=60.0, help="of each drive")
     parser.add_argument("--raw", action="store_true", help="take the logs as they are")
     parser.add_argument("--low-pass", action="store_true", help="ask for the sensors' delay only")
+    parser.add_argument("--right-model", action="store_true", help="ask for intervals only")
     args = parser.parse_args()
-    if args.low_pass:
-        _low_passes(args)
+    if args.low_pass or args.right_model:
+        (_low_passes if args.low_pass else _intervals)(args)
         return
     print(_HEAD)
     outcomes = []
@@ -91,6 +95,28 @@ def _low_passes(args: argparse.Namespace) -> None:
                 inside += all(abs(error) < 1.96 * std_s for error, std_s in errors)
         largest = f"{1000.0 * max(off):.2f}" if off else ""
         print(f"{rung:18s}  {len(off):2d} of {args.seeds:2d}  {largest:>8s}  {inside}", flush=True)
+
+
+def _intervals(args: argparse.Namespace) -> None:
+    print("rung                inside their 95 % intervals, errors in standard errors (rms), mean")
+    effect, values = TRUTHS[args.truth]
+    model = sv.Model(sv.example_vehicle())
+    for rung in _rungs(args):
+        off, found = [], []
+        for seed in range(args.first, args.first + args.seeds):
+            log = ride(rung, args.truth, "lap", seed).between(0.0, args.seconds)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", sv.SysidWarning)
+                fit = sv.identify(model.add(effect) if effect else model, log, starts=2)
+            off += [(fit[name].value - true) / fit[name].std for name, true in values.items()]
+            found += [(fit[name].value, fit[name].std) for name in values]
+        inside = sum(abs(z) < 1.96 for z in off)
+        mean, std = np.mean(found, axis=0)
+        print(
+            f"{rung:18s} {inside:3d} of {len(off):3d}  {np.sqrt(np.mean(np.square(off))):.2f}  "
+            f"{mean:.3f} +- {std:.3f}",
+            flush=True,
+        )
 
 
 def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[str, str]:

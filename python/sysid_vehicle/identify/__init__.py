@@ -1,6 +1,7 @@
 """Identification of parameters and noise from driving."""
 
 from .ahead.ahead import predicting_ahead
+from .beside_noise import beside_noise
 from .fit import Fit
 from .identify import identify, profile_fit, with_own_offsets
 from .input_noise import lost_to_input_noise, with_exact_inputs
@@ -38,6 +39,7 @@ __all__ = [
     "RunsFit",
     "Start",
     "Starts",
+    "beside_noise",
     "driving_beside",
     "driving_of",
     "explaining",

@@ -18,6 +18,7 @@ from ..estimate import Driving, NoiseModel, first_guess
 from ..log import LEAST_USABLE_S, Log, check_car, check_excitation, copies
 from ..model import Model
 from .ahead.ahead import predicting_ahead
+from .beside_noise import beside_noise
 from .fit import Fit
 from .intervals.estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .maximum import (
@@ -194,7 +195,7 @@ def maximised(
 
     fit = before(ends, found, None)
     if fit is not None:
-        return fit
+        return beside_noise(fit)
     seen = [s for s in (o.likeliest for o in (objective, *thinned)) if s is not None]
     every = [(s.p, s.noise) for s in seen] or [(few[0], noise.vector())]
     likeliest = max(every, key=lambda at: log_likelihood_of(objective, *at))
@@ -286,9 +287,10 @@ def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None =
     for _ in range(BETTER_FOUND):
         p, noise, _ = settle_finely(objective, p, noise, box)
         told = NoiseModel.from_vector(noise)
-        fit = summary(fit.model, fit.driving, objective, p, told, fit.starts, fit.converged)
+        known = summary(fit.model, fit.driving, objective, p, told, fit.starts, fit.converged)
+        fit = beside_noise(known)
         estimates, profiles, better = profiled_estimates(
-            objective, p, noise, box, fit, workers, progress
+            objective, p, noise, box, fit, workers, progress, known.by_noise
         )
         if better is None:
             break

@@ -273,7 +273,7 @@ def test_what_gentle_driving_cannot_tell_is_named(start: Model, truth: Model) ->
 
 
 def test_straight_driving_warns(start: Model, truth: Model) -> None:
-    straight = drive(truth, manoeuvres.straight_acceleration(20.0), seed=8, rate_hz=50.0)
+    straight = drive(truth, manoeuvres.straight_acceleration(30.0), seed=8, rate_hz=50.0)
     with pytest.warns(SysidWarning, match="straight_acceleration"):
         found = identify(start, straight, starts=1)
     assert "D_front" in found.undetermined

@@ -27,8 +27,8 @@ def test_what_no_time_was_left_for_is_said(
             patch.setattr(study_module, slow, lambda *_, **__: pytest.fail("no time was left"))
         cut = replace(ended_at_once(study)).in_time(1e-9)
     assert set(cut.left_out) == {
-        *("shares", "predicting", "disagreements", "small", "where", "unknown", "late"),
-        *("causes", "errors_with", "hidden"),
+        *("shares", "predicting", "disagreements", "between_logs", "small", "where"),
+        *("unknown", "late", "causes", "errors_with", "hidden"),
     }
     said = "o time was left to find out how much of the errors ahead could be explained; what a fit"
     assert f"Warning: n{said}" in str(cut)

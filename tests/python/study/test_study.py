@@ -129,10 +129,10 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     study.to_json(path)
     told = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse_constant)
     assert sorted(told) == [
-        *("causes", "channels", "disagreements", "effects", "errors", "events", "explained"),
-        *("horizons", "late_facts", "left_out", "next_steps", "parameters", "predicting"),
-        *("ranking", "regions"),
-        *("shares", "unknown", "verdict", "verdicts", "warnings", "where", "where_baseline"),
+        *("between_logs", "causes", "channels", "disagreements", "effects", "errors", "events"),
+        *("explained", "horizons", "late_facts", "left_out", "next_steps", "parameters"),
+        *("predicting", "ranking", "regions", "shares", "unknown", "verdict", "verdicts"),
+        *("warnings", "where", "where_baseline"),
     ]
     assert told["verdict"] == "explained"
     assert study.added[0].id in told["causes"]["sets"][0]["effects"]

@@ -246,6 +246,7 @@ def profiled_estimates(
     fit: Estimated,
     workers: int | None,
     progress: bool | None,
+    held: FloatArray | None = None,
 ) -> tuple[tuple[Estimate, ...], tuple[Profile, ...], FloatArray | None]:
     """Intervals, and the notes that they decide, of the profile likelihood.
 
@@ -257,7 +258,7 @@ def profiled_estimates(
     better : array, shape (parameters,), or None
         Parameters of higher likelihood, where profiling came upon some.
     """
-    at = Optimum.of(objective, p, noise, box, fit.by_noise)
+    at = Optimum.of(objective, p, noise, box, fit.by_noise, held)
     wanted = list(fit.quantities.values())
     found, better = profile_all(at, wanted, workers=workers, progress=progress)
     estimates = tuple(

@@ -34,23 +34,28 @@ class Optimum:
 
     Parameters
     ----------
-    objective : Penalised
+    objective : Objective
+    noise : array, shape (noises,)
     gains : object
-        Those of the problem there.
+        Those of the problem there, by which searches go.
     box : Box
     p : array, shape (parameters,)
     covariance : array, shape (free, free)
         Of the free parameters.
     cost : float
-        Half the sum of squares.
+        Minus the log-likelihood.
+    held : array, shape (free, free), optional
+        Their covariance were the noise known, with which the gains were made; by default the same.
     """
 
-    objective: Penalised
+    objective: Objective
+    noise: FloatArray
     gains: Any
     box: Box
     p: FloatArray
     covariance: FloatArray
     cost: float
+    held: FloatArray | None = None
 
     @classmethod
     def of(
@@ -60,20 +65,32 @@ class Optimum:
         noise: FloatArray,
         box: Box,
         covariance: FloatArray,
+        held: FloatArray | None = None,
     ) -> Optimum:
         """Of parameters and noise that were found."""
         gains = objective.freeze(p, noise)
-        return cls(objective, gains, box, p, covariance, objective.half_sum_of_squares(p, gains))
+        cost = -objective.reached(p, gains)
+        return cls(objective, noise, gains, box, p, covariance, cost, held)
 
     def cost_of(self, p: FloatArray) -> float:
-        """Half the sum of squares of other parameters."""
-        return self.objective.half_sum_of_squares(p, self.gains)
+        """Minus the log-likelihood of other parameters, whose gains are their own."""
+        return -float(self.objective.log_likelihoods(p[None], self.noise)[0])
 
     def across(self, what: Quantity) -> tuple[FloatArray, float]:
         """Covariance of the free parameters with a quantity, and its variance."""
         gradient = _felt(what, self.p)[self.box.columns]
         across = self.covariance @ gradient
         return as_float64(across), float(gradient @ across)
+
+    def left_by_noise(self, what: Quantity) -> float:
+        """What is lost where the noise is learned anew, of what is lost where it is held.
+
+        To first order, as of variances.
+        """
+        if self.held is None:
+            return 1.0
+        gradient = _felt(what, self.p)[self.box.columns]
+        return float(gradient @ self.held @ gradient) / self.across(what)[1]
 
     def bottom(self, objective: Penalised, p: FloatArray, box: Box) -> FloatArray:
         """The way down from `p`."""
@@ -118,10 +135,9 @@ def side_of(at: Optimum, what: Quantity, sign: float) -> Side:
     furthest = abs(limit - centre) if bounded else max(20.0 * std, 3.0 * abs(centre))
     if furthest <= 1e-9 * max(abs(centre), 1.0):
         return nowhere
-    along = box.on_scales(at.p, across / variance)
-    return _Walk(
-        at, what, sign, centre, std, furthest, bounded, along, _Known(0.0, 0.0, at.p)
-    ).walked()
+    along, left = box.on_scales(at.p, across / variance), at.left_by_noise(what)
+    begin = _Known(0.0, 0.0, at.p)
+    return _Walk(at, what, sign, centre, std, furthest, bounded, along, left, begin).walked()
 
 
 class _Known(NamedTuple):
@@ -146,6 +162,8 @@ class _Walk:
         Whether the search box ends there.
     along : array, shape (free parameters,)
         Change of the free parameters, on their scales, with the quantity.
+    left_by_noise : float
+        Of `Optimum`.
     inside, outside : _Known
         The furthest point below the level, and the last one above it, which there need not be.
     longest : float
@@ -160,6 +178,7 @@ class _Walk:
     furthest: float
     bounded: bool
     along: FloatArray
+    left_by_noise: float
     inside: _Known
     outside: _Known | None = None
     longest: float = np.inf
@@ -200,7 +219,8 @@ class _Walk:
         """Best other parameters at a distance, and the likelihood lost."""
         target = self.centre + self.sign * distance
         start = moved(self.inside.p, self.at.box, self.along, self.what, target)
-        return pinned(self.at, start, self.what, target, self.std)
+        there, loss = pinned(self.at, start, self.what, target, self.std)
+        return there, self.left_by_noise * loss
 
     def _goes_on(self, found: _Known) -> bool:
         """Take up a point; whether there is more to be asked for."""

@@ -14,7 +14,7 @@ import numpy as np
 from ..._common.memo import remembered
 from ..._common.text import few, unit_after
 from ...errors import NumericalError
-from ...identify import Fit, refine
+from ...identify import Fit, beside_noise, refine
 from ...rules import USUAL, Rules
 from ..results.next_steps import SHORT_S
 from ..search.steps import merit
@@ -69,7 +69,7 @@ def by_log(fit: Fit) -> tuple[Fit, ...]:
     if len(logs) < 2 or min(d.usable_s for d in logs) < SHORT_S:
         return ()
     try:
-        return tuple(refine(fit.model, d, fit.noise) for d in logs)
+        return tuple(beside_noise(refine(fit.model, d, fit.noise)) for d in logs)
     except (NumericalError, np.linalg.LinAlgError):
         return ()
 

@@ -16,7 +16,7 @@ from ..._common.memo import remembered
 from ..._common.text import unit_after
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Estimate, Fit, driving_of, refine
+from ...identify import Estimate, Fit, beside_noise, driving_of, refine
 from ...rules import USUAL, Rules
 
 STIFFNESS = ("cornering stiffness front", "cornering stiffness rear")
@@ -73,7 +73,7 @@ def disagreements(fit: Fit, test: Driving, rules: Rules = USUAL) -> tuple[Disagr
         `sure` standard errors are a disagreement.
     """
     try:
-        other = refine(fit.model, driving_of(fit, test), fit.noise)
+        other = beside_noise(refine(fit.model, driving_of(fit, test), fit.noise))
     except (NumericalError, np.linalg.LinAlgError):
         return ()
     told = {e.name for e in (*fit.estimates, *fit.derived)}

@@ -26,7 +26,7 @@ from ...diagnose.diagnose import REFITS
 from ...effects import Effect
 from ...errors import Interrupted, NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine, with_own_offsets
+from ...identify import Fit, beside_noise, refine, with_own_offsets
 from ...rules import Rules, harmful, worse
 from ..ahead.along_the_car import changes_of
 from ..ahead.own_share import own_shares
@@ -252,7 +252,7 @@ class Search:
             if any(set(f.model.effects) == effects for f in trail.fits):
                 return
             known = set(trail.fit.model.effects)
-            trail.fits.append(found)
+            trail.fits.append(beside_noise(found))
             self.say(_step(found, known))
 
     def _that_hold(
@@ -288,8 +288,8 @@ class Search:
                 return
             trail.harmful += (name,)
             if len(added) > 1:
-                trail.fits.append(poorer)
-                trail.diagnoses.append(self._diagnosis(poorer, (), refits=0))
+                trail.fits.append(beside_noise(poorer))
+                trail.diagnoses.append(self._diagnosis(trail.fit, (), refits=0))
             else:
                 del trail.fits[1:], trail.diagnoses[1:]
             self.say(f"Removed {name}.")
@@ -306,8 +306,8 @@ class Search:
         with suppress(NumericalError, np.linalg.LinAlgError):
             found = before(self.judged_by, partial(with_own_offsets, fit), fit)
         if found is not fit and lead(found, fit, self.test) > 0.0:
-            trail.fits[-1] = found
-            trail.diagnoses[-1] = self._diagnosis(found, (), refits=0)
+            trail.fits[-1] = beside_noise(found)
+            trail.diagnoses[-1] = self._diagnosis(trail.fit, (), refits=0)
 
     def _without(self, fit: Fit, name: str) -> Fit | None:
         try:
