@@ -59,8 +59,12 @@ def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
     assert not change.calm
     assert contradictions_of_changes(str(change)) == []
     calm = replace(likely, said="not testable", probability=None)
-    text = str(replace(offset, effects=(calm,)))
+    text = str(replace(offset, effects=(calm,), nothing=0.7))
     assert text.startswith("no change is shown\n")
+    withheld = str(replace(offset, effects=(calm,), nothing=1e-9))
+    assert withheld.startswith("something changed, and no effect is sure enough to be named: that")
+    small = replace(likely, said="negligible")
+    assert str(replace(offset, effects=(small,))).startswith("no change is shown\n")
     assert contradictions_of_changes(text) == []
 
 

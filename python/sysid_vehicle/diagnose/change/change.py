@@ -120,6 +120,12 @@ class Change(Printed):
                 f"something changed, and what explains it is not shown: {'; '.join(beyond)} "
                 "fits best, and is larger than on any car"
             )
+        little = any(e.said == "negligible" for e in self.effects)
+        if self.nothing < 1.0 - self.rules.credible and not little:
+            return (
+                "something changed, and no effect is sure enough to be named: that nothing did has "
+                f"a probability of {number(self.nothing, 2)}"
+            )
         return "no change is shown"
 
     def _before(self, effect: str, e: EffectChange) -> bool:
