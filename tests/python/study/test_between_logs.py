@@ -1,14 +1,25 @@
 """Training logs of a car that was not the same in all of them."""
 
+import importlib
 from dataclasses import replace
 
 import pytest
 
-from sysid_vehicle import Fit, Log, Model, drive, identify, manoeuvres
+from sysid_vehicle import (
+    Fit,
+    Log,
+    Model,
+    SysidWarning,
+    drive,
+    identify,
+    improve,
+    manoeuvres,
+)
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study.judge.between_logs import no_effect_but_the_log, told_differently
 from sysid_vehicle.study.judge.one_for_all import one_for_all
+from sysid_vehicle.study.results.added import AddedEffect
 
 
 def laps(*cars: Model) -> list[Log]:
@@ -67,3 +78,21 @@ def test_short_logs_and_single_ones_tell_no_car(start: Model, truth: Model, soft
     pieces = [log.between(0.0, 12.0) for log in laps(truth, softer)]
     assert told_differently(identify(start, pieces, starts=1)) == []
     assert told_differently(identify(start, laps(truth), starts=1)) == []
+
+
+def test_what_a_simpler_reason_explains_is_not_confirmed(
+    start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lagging = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.06})
+    train, test = laps(lagging, lagging)
+
+    def added() -> AddedEffect:
+        study = improve(start, train, test, starts=1, candidates=["steer_lag"], sensors=False)
+        (lag,) = study.added
+        return lag
+
+    assert added().grade == "confirmed"
+    judge = importlib.import_module("sysid_vehicle.study.judge.judge")
+    monkeypatch.setattr(judge, "one_for_all", lambda *_: "steer_lag may be a mistake")
+    with pytest.warns(SysidWarning, match="steer_lag may be a mistake"):
+        assert added().grade == "plausible"

@@ -182,7 +182,7 @@ class Judge:
                 alone,
                 decision,
                 facts,
-                shared,
+                self.added if one else shared,
                 rules,
                 estimates_of(fit, wide),
                 idle,

@@ -171,7 +171,8 @@ def added_by(
     facts : Facts
         From which it follows.
     shared : collection of str
-        Effects of which nobody knows what each takes of the error: none is sure.
+        Effects of which nobody knows what each takes of the error, or that have a simpler
+        explanation, which a warning tells: none is sure.
     rules : Rules
     estimates : sequence of Estimate, optional
         Of the parameters of the final model; by default those of its fit.
