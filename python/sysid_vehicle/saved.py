@@ -32,7 +32,7 @@ _PACKAGE = __name__.rpartition(".")[0]
 # Stations of the package whose dataclasses may stand in a file.
 _STATIONS = (
     *("tyre", "vehicle", "effects", "model", "rules", "log", "estimate", "identify", "compare"),
-    *("diagnose", "study"),
+    *("diagnose", "sensors", "study"),
 )
 # Where modules have moved to since a version wrote their classes: old name to new name.
 _MOVED: dict[str, str] = {

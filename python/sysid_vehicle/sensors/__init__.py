@@ -4,7 +4,7 @@ from .check import check
 from .condition import Conditioning
 from .faults import SensorFault
 from .ready import Kinematics, made_ready
-from .result import SensorCheck, put_right
+from .result import SensorCheck
 from .settled import backed
 from .signals import quantum
 
@@ -16,6 +16,5 @@ __all__ = [
     "backed",
     "check",
     "made_ready",
-    "put_right",
     "quantum",
 ]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .._common.arrays import FloatArray
@@ -14,6 +15,7 @@ from ..effects import Effect
 from ..errors import InvalidInput, near_names
 from ..log import Log
 from ..rules import USUAL, Rules
+from ..saved import save
 from ..vehicle import Vehicle
 from .apply import LATE, corrected, retimed
 from .condition import Conditioning
@@ -79,6 +81,16 @@ class SensorCheck:
     conditioning: Conditioning | None = None
     moments: tuple[Moment, ...] = ()
 
+    def save(self, path: str | Path) -> None:
+        """Write the check, with the logs; :func:`sysid_vehicle.load` reads it.
+
+        Raises
+        ------
+        InvalidInput
+            If the file cannot be written.
+        """
+        save(self, path)
+
     @property
     def found(self) -> tuple[SensorFault, ...]:
         """Faults that are there."""
@@ -107,11 +119,10 @@ class SensorCheck:
         InvalidInput
             If there is none of this name; near names are given.
         """
-        for fault in self.faults:
-            if fault.name == name:
-                return fault
-        names = [fault.name for fault in self.faults]
-        raise InvalidInput(f"there is no sensor fault '{name}'{near_names(name, names)}")
+        known = {fault.name: fault for fault in self.faults}
+        if name in known:
+            return known[name]
+        raise InvalidInput(f"there is no sensor fault '{name}'{near_names(name, tuple(known))}")
 
     @cached_property
     def settles(self) -> tuple[str, ...]:
@@ -231,12 +242,11 @@ class SensorCheck:
         rows: list[tuple[str, ...]] = []
         taken = to_put_right(self.faults)
         for fault in self.faults:
+            span, value = "", ""
             if fault.measured:
                 low, high = fault.interval
                 span = f"{number(low, 3)} to {number(high, 3)} {fault.unit}".rstrip()
                 value = number(fault.value, 3)
-            else:
-                span, value = "", ""
             verdict = "found" if fault.found else "not there" if fault.told else "cannot be told"
             if fault.name in taken and not fault.found:
                 verdict = "like the other speed"
@@ -266,8 +276,8 @@ class SensorCheck:
         return rows
 
     def _said(self) -> list[str]:
-        lines = [f"cannot be told: {f.title} ({f.channel}), {f.why_not}" for f in self.not_told]
-        return [*lines, *(f"cannot be told: {text}" for text in ON_CORRECTION)]
+        told = (f"{f.title} ({f.channel}), {f.why_not}" for f in self.not_told)
+        return [f"cannot be told: {text}" for text in (*told, *ON_CORRECTION)]
 
     def _offset_lines(self) -> list[str]:
         return [
@@ -286,10 +296,10 @@ class SensorCheck:
             jumped = list(dict.fromkeys(m.channel for m in self.moments))
             contradict = "contradicts" if len(jumped) == 1 else "contradict"
             filtered += f" For a moment {' and '.join(jumped)} {contradict} the others."
-        if len(self.found) == 1:
-            return f"{names}: 1 sensor fault was found.{filtered}"
         if self.found:
-            return f"{names}: {len(self.found)} sensor faults were found.{filtered}"
+            several = len(self.found) > 1
+            told = f"{len(self.found)} sensor faults were" if several else "1 sensor fault was"
+            return f"{names}: {told} found.{filtered}"
         either = {n: self[n] for f in self.faults if f.or_another for n in (f.name, f.or_another)}
         if either:
             which = " or ".join(f"{f.title} ({f.channel})" for f in either.values())
@@ -388,12 +398,3 @@ class SensorCheck:
             "channel_map": list(self.map_lines),
             "remarks": list(self.remarks),
         }
-
-
-def put_right(
-    sensors: SensorCheck | None, logs: Log | Sequence[Log] | None
-) -> Log | Sequence[Log] | None:
-    """The logs, put right where a check is given."""
-    if sensors is None or logs is None:
-        return logs
-    return sensors.apply(logs) if isinstance(logs, Log) else [sensors.apply(log) for log in logs]

@@ -17,7 +17,7 @@ from ..identify.identify import maximised
 from ..log import Log, several_logs
 from ..model import Model
 from ..rules import USUAL, Rules
-from ..sensors import Kinematics, SensorCheck, made_ready, put_right
+from ..sensors import Kinematics, SensorCheck, made_ready
 from .asked import asked
 from .judge.judge import Judge
 from .limit import Judging, Schedule
@@ -224,8 +224,8 @@ def _ready(
     if sensors is False:
         return logs, test, Kinematics(), True
     if sensors is not None:
-        put = [sensors.apply(log) for log in logs], put_right(sensors, test)
-        return *put, Kinematics(sensors.settles), True
+        own, rest = ([sensors.apply(log) for log in some] for some in (logs, others))
+        return own, None if test is None else rest, Kinematics(sensors.settles), True
     ready = before(ends, lambda: made_ready(logs, others), None)
     if ready is None:
         return logs, test, Kinematics(), False

@@ -48,6 +48,15 @@ def test_other_results(fit: sv.Fit, course: sv.Log, tmp_path: Path) -> None:
         assert str(read) == str(result)
 
 
+def test_a_check_of_sensors(lap: sv.Log, tmp_path: Path) -> None:
+    check = sv.check(lap)
+    check.save(tmp_path / "check.npz")
+    read = sv.load(tmp_path / "check.npz")
+    assert str(read) == str(check)
+    assert read.to_dict() == check.to_dict()
+    same(read.apply(lap), check.apply(lap))
+
+
 @pytest.mark.filterwarnings("ignore::sysid_vehicle.errors.SysidWarning")  # it is short
 def test_a_study(tmp_path: Path, truth: sv.Model, monkeypatch: pytest.MonkeyPatch) -> None:
     module = importlib.import_module("sysid_vehicle.study.study")
