@@ -30,7 +30,7 @@ import numpy as np
 from rungs import PAIRS, RUNGS, TRUTHS, low_pass_s, present, ride
 
 import sysid_vehicle as sv
-from sysid_vehicle.identify import Estimate
+from sysid_vehicle.identify import Estimate, refit
 from sysid_vehicle.sensors import Conditioning
 
 _NEAR = 0.2  # of the size of what the rung brings about: a lag is not quite a delay
@@ -98,25 +98,28 @@ def _low_passes(args: argparse.Namespace) -> None:
 
 
 def _intervals(args: argparse.Namespace) -> None:
-    print("rung                inside their 95 % intervals, errors in standard errors (rms), mean")
+    print(
+        "rung                noise held: inside 95 %, errors in standard errors; counted: the same"
+    )
     effect, values = TRUTHS[args.truth]
-    model = sv.Model(sv.example_vehicle())
+    if not values:
+        raise SystemExit("--right-model: nothing is hidden, and nothing has an interval")
+    model = sv.Model(sv.example_vehicle()).add(effect)
     for rung in _rungs(args):
-        off, found = [], []
+        off: list[list[float]] = [[], []]
         for seed in range(args.first, args.first + args.seeds):
             log = ride(rung, args.truth, "lap", seed).between(0.0, args.seconds)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", sv.SysidWarning)
-                fit = sv.identify(model.add(effect) if effect else model, log, starts=2)
-            off += [(fit[name].value - true) / fit[name].std for name, true in values.items()]
-            found += [(fit[name].value, fit[name].std) for name in values]
-        inside = sum(abs(z) < 1.96 for z in off)
-        mean, std = np.mean(found, axis=0)
-        print(
-            f"{rung:18s} {inside:3d} of {len(off):3d}  {np.sqrt(np.mean(np.square(off))):.2f}  "
-            f"{mean:.3f} +- {std:.3f}",
-            flush=True,
-        )
+                fit = sv.identify(model, log, starts=2)
+                held = refit(fit.model, fit.driving, fit.noise)
+            for z, of in zip(off, (held, fit), strict=True):
+                z += [(fit[name].value - true) / of[name].std for name, true in values.items()]
+        told = []
+        for z in map(np.array, off):
+            inside = np.count_nonzero(np.abs(z) < 1.96)
+            told.append(f"{inside:3d} of {z.size:3d}  {np.sqrt(np.mean(z**2)):.2f}")
+        print(f"{rung:18s} {'; '.join(told)}", flush=True)
 
 
 def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[str, str]:

@@ -53,7 +53,7 @@ def beside_noise(fit: Fit) -> Fit:
     told = np.array([np.isfinite(e.std) for e in fit.estimates])
     few = fit.driving.problem(fit.model, most_samples=_SAMPLES)
     objective = objective_of(fit.model, few, fit.driving)
-    if not told.any() or not _disturbed(objective, noise):
+    if not told.any():
         return fit
     axes = _axes(fit.by_noise, _beforehand(objective, p, box), box.units(x), told)
     if not axes.size:
@@ -111,10 +111,15 @@ def _axes(
 def _taken(
     objective: Objective, p: FloatArray, noise: FloatArray, box: Box, axes: FloatArray
 ) -> FloatArray:
-    """Information about the combinations that is as well one about the noise, (axes, axes)."""
+    """Information about the combinations that is as well one about the noise, (axes, axes).
+
+    None where no disturbance is told: the noise of sensors says nothing of the car.
+    """
     _, here, information = objective.problem.noise_score(p, noise)
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     free = (size > _KNOWN) & (objective.lowest < noise) & (noise < objective.highest)
+    if not free[DISTURBANCE].any():
+        return np.zeros((axes.shape[1],) * 2)
 
     def slope(axis: FloatArray) -> FloatArray:
         there = box.put(p, box.moved(p[box.columns], _STEP * axis))
@@ -149,8 +154,3 @@ def _bend(
         both = value[2 * n + 1 + 4 * k :][:4]
         bend[i, j] = bend[j, i] = 0.25 * (both[1] + both[2] - both[0] - both[3])
     return as_float64(bend / _BEND**2)
-
-
-def _disturbed(objective: Objective, noise: FloatArray) -> bool:
-    """Whether forces that no model explains were learned, beyond the least there may be."""
-    return bool(np.any(noise[DISTURBANCE] > objective.lowest[DISTURBANCE]))
