@@ -13,10 +13,11 @@
    So is one with which errors ahead grow beside all others of an incomplete model (`harmful`).
 6. When nothing is added any more, the final model is tested for anything left: at `level` on the
    training data, for one effect more, and at `strict` for anything unknown on all data together.
-   What the driving predicts on all data by more than `explainable` is left too; where it predicts
-   nothing, only evidence below `strict` counts. So is what a baseline errs on validation data
-   beyond what training data foretell, at `strict` and by more than `explainable` (`unforeseen`),
-   and a disturbance of it that lasts as long as any may: slow forces have a cause.
+   Where the driving predicts no more than `explainable` of what is left on any data, only evidence
+   below `strict` counts. A share alone is no evidence: who steers against disturbances makes the
+   driving tell of them. What a baseline errs on validation data beyond what training data foretell
+   is left too, at `strict` and by more than `explainable` (`unforeseen`), and a disturbance of it
+   that lasts as long as any may: slow forces have a cause.
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
    implausible, or differs between pieces of the driving by a size that matters, or if something
    unknown does all that it does and more: by a part worth a name (`explainable`), where it is so

@@ -118,9 +118,9 @@ class Facts:
         Channels that contradict the others, in words.
     excited : bool
         Whether the training data excite the lateral motion.
-    structure : (float, float)
+    structure : float
         Share of anything that the final model leaves which a function of the driving is shown to
-        predict: on training or validation data, and of the same thing on both.
+        predict, on training or validation data.
     small : bool
         Whether no error of the baseline 0.5 to 5 s ahead on validation data is as large as matters
         to the user; where nobody said, as the noise of its sensor.
@@ -144,7 +144,7 @@ class Facts:
     added: tuple[Added, ...] = ()
     contradictions: tuple[str, ...] = ()
     excited: bool = True
-    structure: tuple[float, float] = (1.0, 0.0)
+    structure: float = 1.0
     small: bool = False
     buried: bool = False
     unopposed: bool = False

@@ -94,22 +94,23 @@ def unforeseen(ratio: float, p_value: float, rules: Rules = USUAL) -> bool:
 def something_left(facts: Facts, rules: Rules = USUAL) -> bool:
     """Whether the final model is shown to be incomplete.
 
-    Beyond doubt, or by a share of what it leaves that the driving predicts on all data. Of lesser
-    evidence the ceiling has the last word: what no function of the driving predicts on any data is
-    disturbance. A baseline alone is asked what it leaves of validation data, too: what training
-    data do not bring about they cannot show. So is it whether its disturbances are none: what lasts
-    is a force, whether it depends on the driving or on the place.
+    Beyond doubt, or by lesser evidence where the driving predicts a share of what is left: what no
+    function of the driving predicts on any data is disturbance. Such a share alone proves nothing:
+    who steers against a disturbance makes the driving tell of it, and only tests of one step, which
+    know no more than the driver did, are not led astray. A baseline alone is asked what it leaves
+    of validation data, too: what training data do not bring about they cannot show. So is it
+    whether its disturbances are none: what lasts is a force, whether it depends on the driving or
+    on the place.
     """
-    anywhere, everywhere = facts.structure
     if not facts.added and (facts.unforeseen or facts.slow):
         return True
-    if everywhere > rules.explainable or _together(facts, rules):
+    if facts.together is not None and facts.together.p_value < rules.strict:
         return True
     one_more = min(rules.alpha, rules.level) if facts.added else rules.alpha
     evidence = (facts.fitted.p_value, rules.level), (facts.candidate, one_more)
     if not all(p > min(rules.strict, level) for p, level in evidence):
         return True
-    return anywhere > rules.explainable and not all(p > level for p, level in evidence)
+    return facts.structure > rules.explainable and not all(p > level for p, level in evidence)
 
 
 def incomplete(facts: Facts, rules: Rules = USUAL) -> bool:
@@ -186,10 +187,6 @@ def standing(facts: Facts, decision: Decision) -> frozenset[str]:
         return frozenset()
     named = (a for a in facts.added if a.named)
     return frozenset(a.id for a in named if not _falls(a, decision.withdrawn))
-
-
-def _together(facts: Facts, rules: Rules) -> bool:
-    return facts.together is not None and facts.together.p_value < rules.strict
 
 
 def _falls(effect: Added, withdrawn: Sequence[Withdrawn]) -> bool:

@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Driving, Fit, Model, drive, manoeuvres
+from sysid_vehicle import (
+    Driving,
+    Fit,
+    Model,
+    SensorNoise,
+    drive,
+    example_vehicle,
+    identify,
+    manoeuvres,
+)
 from sysid_vehicle.diagnose import instead
 from sysid_vehicle.diagnose.candidates.instead import _hats, _remembered
 
@@ -82,3 +91,16 @@ def test_signals_of_unknown_forces() -> None:
     for seconds, column in zip((0.5, 2.0, 8.0), memory.T, strict=True):
         t = np.concatenate([np.arange(1, 401) / 100.0, np.arange(1, 401) / 50.0])
         np.testing.assert_allclose(column, 1.0 - np.exp(-t / seconds), rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [562, 563])
+def test_noise_of_the_steering_is_no_unknown_force(seed: int) -> None:
+    """It stands in the directions and in the residuals: their product does not average out."""
+    model, noise = Model(example_vehicle()), SensorNoise(steer_rad=1e-3)
+    road = manoeuvres.Manoeuvre(
+        *("road", "bends", 100.0),
+        *(lambda t: 20.0 + 4.0 * np.sin(0.1 * t), lambda t: 3.0 * np.sin(0.35 * t) ** 3),
+        tracks_path=True,
+    )
+    fit = identify(model, drive(model, road, seed=seed, rate_hz=50.0, noise=noise))
+    assert instead(fit, fit.driving, ()).omnibus.p_value > 0.01

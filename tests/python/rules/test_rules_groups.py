@@ -24,7 +24,7 @@ def facts(own: Share, own_in_training: Share) -> Facts:
         Omnibus(200.0, 30, 1e-18, "M_z"),
         missing=(8.0, 3.0),
         taken_low=0.6,
-        structure=(0.44, 0.44),
+        structure=0.44,
         added=(late, inertia),
     )
     return found.with_groups({("steer_delay", "yaw_inertia"): (MOST, MOST)})

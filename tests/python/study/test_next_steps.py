@@ -325,7 +325,7 @@ def said(base: Study, rng: random.Random) -> str:
         added,
         tuple(unrelated.values()),
         excited=rng.random() < 0.8,
-        structure=(structure.anywhere, structure.everywhere),
+        structure=structure.anywhere,
         small=rng.random() < 0.5,
         buried=rng.random() < 0.3,
         unforeseen=expected is not None and expected.unforeseen,

@@ -33,3 +33,19 @@ def test_a_missing_drag_is_seen_in_the_speed_ahead() -> None:
     found = structure(sv.identify(car, drives[0]), Driving.of(drives[1]))
     assert found.test["error of v_x 1 s ahead"].low > 0.8
     assert found.test["error of v_x 5 s ahead"].low > 0.8
+
+
+def test_a_driver_who_holds_the_speed_on_slopes_is_no_structure() -> None:
+    """The pull follows every slope of the road, and no model could know it from that."""
+    car, hilly = sv.Model(sv.example_vehicle()), sv.RoadDisturbance(slope_rad=0.026)
+    wander = sv.manoeuvres.Knots(
+        (0.0, 50.0, 100.0, 150.0, 200.0), (20.0, 24.0, 18.0, 25.0, 21.0), True
+    )
+    road = sv.manoeuvres.Manoeuvre(
+        "road", "slopes", 200.0, wander, lambda t: 2.0 * np.sin(0.5 * t), True
+    )
+    drives = [sv.drive(car, road, seed=s, rate_hz=50.0, disturbance=hilly) for s in (1, 2)]
+    found = structure(sv.identify(car, drives[0]), Driving.of(drives[1]))
+    along = {name: e.low for name, e in found.test.items() if "v_x" in name or "a_x" in name}
+    assert len(along) == 4
+    assert max(along.values()) < 0.05, along

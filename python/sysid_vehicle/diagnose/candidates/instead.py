@@ -31,6 +31,7 @@ from ...vehicle import AXLES, GRAVITY_MPS2, slip_angles
 from ..evidence.coordinates import begins, late
 from ..evidence.directions import Ask, Directions
 from ..evidence.evidence import FORCES, READINGS, Evidence, Section
+from ..evidence.input_noise import added_by_input_noise
 from ..evidence.projection import pseudo_inverse
 from ..unexplained.omnibus import LEAST_LEFT, Omnibus, Unknown
 
@@ -72,8 +73,13 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
     # What the effects do is no nuisance here: their parameters compete.
     bare = replace(fit, model=fit.model.with_fixed(names))
     rivals = Rivals(Evidence(bare, driving), tuple(names))
-    found = _Competition(Directions(rivals.evidence, rivals), rivals, bare)
+    projected = Directions(rivals.evidence, rivals)
+    found = _Competition(projected, rivals, bare)
     every = list(range(len(names)))
+    if found.strongest(every, rivals.hypotheses, rules)[1].rejects:
+        added = added_by_input_noise(rivals.evidence, rivals, rivals.noisier)
+        projected.take_off(rivals, added)
+        found = _Competition(projected, rivals, bare)
     price = rules.price * float(np.log(driving.samples))
     away: dict[str, str] = {}
     copied: set[str] = set()  # by what explains no more than they do
@@ -117,13 +123,29 @@ class Rivals:
     evidence : Evidence
     names : tuple of str
         Parameters, whose columns come first.
+    flexible : Unknown, optional
+        Forces and readings of the driving, by default those of the evidence.
+    noise : array, shape (samples, 2), optional
+        That is added to the measured steering and pull.
     """
 
     groups = ()
 
-    def __init__(self, evidence: Evidence, names: tuple[str, ...]) -> None:
+    def __init__(
+        self,
+        evidence: Evidence,
+        names: tuple[str, ...],
+        flexible: Unknown | None = None,
+        noise: FloatArray | None = None,
+    ) -> None:
         self.evidence, self.names = evidence, names
-        self._flexible = Unknown(evidence)
+        self._flexible = flexible or Unknown(evidence)
+        driving = evidence.driving
+        self._steer = driving.channel("steer_rad")
+        self._pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
+        self._pull_unit = max(float(np.nanstd(self._pull)), 1e-9)
+        if noise is not None:
+            self._steer, self._pull = self._steer + noise[:, 0], self._pull + noise[:, 1]
         forces = evidence.targets(*FORCES)
         several = _SHAPES_REMEMBERED * len(_MEMORIES_S)
         self._remembered = [FORCES[f] for f in forces for _ in range(several)]
@@ -138,6 +160,10 @@ class Rivals:
             self._note(f"side force of the {axle} axle", "F_y", slice(0, len(_SLIPS_RAD)))
         for force in forces:
             self._note(f"{force} that remembers the driving", force, slice(0, several))
+
+    def noisier(self, evidence: Evidence, noise: FloatArray) -> Rivals:
+        """The same of noisier evidence."""
+        return Rivals(evidence, self.names, self._flexible.noisier(evidence, noise), noise)
 
     def _note(self, what: str, target: str, columns: slice) -> None:
         self.targets[what] = target
@@ -168,11 +194,9 @@ class Rivals:
         starts = begins(driving)
         first = np.union1d([0], starts[(starts > at.start) & (starts < at.stop)] - at.start)
         v, side, r = state[:, 0], state[:, 1], state[:, 2]
-        steer = driving.channel("steer_rad")[at]
-        front, rear = slip_angles(car.lf_m, car.lr_m, steer, v, side, r)
+        front, rear = slip_angles(car.lf_m, car.lr_m, self._steer[at], v, side, r)
         slip = {car.lf_m: front, -car.lr_m: rear}
-        pull = driving.channel("fx_n") if driving.force_known else driving.channel("ax_mps2")
-        a, u = v * r / GRAVITY_MPS2, pull[at] / max(float(np.nanstd(pull)), 1e-9)
+        a, u = v * r / GRAVITY_MPS2, self._pull[at] / self._pull_unit
         shapes = np.column_stack([a, a**2, u, np.abs(u)])
         memory = late(_remembered(shapes, first, driving.sample_rate_hz[at]), first)
         memory = np.tile(memory, len(self._remembered) // memory.shape[1])

@@ -2,8 +2,9 @@
 
 A flexible regression of the missing side force and yaw moment on what the driver does: steering,
 speed and longitudinal acceleration, and their history. Measured lateral motion is no regressor: it
-holds the missing force itself. Of errors of the speed ahead, the speed is none from where the
-prediction begins: it holds the error, and at constant speed it is little else. The regression is
+holds the missing force itself. Of errors along the car ahead, speed and pull are none from where
+the prediction begins: the speed holds the error, and whoever holds a speed answers it with the
+pull, so that the pull tells of every slope. The regression is
 fitted to the training data and judged on validation data, so that what it explains there is a lower
 bound of what is explainable; the rest is disturbance, noise, or hidden from the inputs.
 """
@@ -170,17 +171,17 @@ class Inputs:
     other: FloatArray
 
     @classmethod
-    def of(cls, fit: Fit, train: Driving, other: Driving, *, speed_until_s: float = 0.0) -> Inputs:
+    def of(cls, fit: Fit, train: Driving, other: Driving, *, along_until_s: float = 0.0) -> Inputs:
         """Histories of steering, speed and longitudinal acceleration.
 
         Parameters
         ----------
         fit : Fit
         train, other : Driving
-        speed_until_s : float
-            How long ago the latest speed is.
+        along_until_s : float
+            How long ago the latest speed and pull are.
         """
-        features = [_features(fit, d, speed_until_s) for d in (train, other)]
+        features = [_features(fit, d, along_until_s) for d in (train, other)]
         centre, spread = features[0].mean(axis=0), features[0].std(axis=0)
         used = spread > 1e-9 * np.maximum(np.abs(centre), 1e-9)
         X, Z = (
@@ -297,14 +298,14 @@ def _block_numbers(driving: Driving) -> Whole:
     return np.searchsorted(starts, np.arange(driving.samples), side="right") - 1
 
 
-def _features(fit: Fit, driving: Driving, speed_until_s: float = 0.0) -> FloatArray:
+def _features(fit: Fit, driving: Driving, along_until_s: float = 0.0) -> FloatArray:
     """Regressors, (samples, n): polynomials of the inputs now and some time ago."""
     car = fit.model.vehicle
     steer, v = driving.channel("steer_rad"), driving.channel("vx_mps")
     pull = driving.channel("fx_n") / car.mass_kg if driving.force_known else None
     pull = driving.channel("ax_mps2") if pull is None else pull
     v, pull = (np.nan_to_num(x, nan=float(np.nanmean(x))) for x in (v, pull))
-    v = _ago(driving, v, speed_until_s)
+    v, pull = (_ago(driving, x, along_until_s) for x in (v, pull))
     # Lateral acceleration that a neutral car would have, and some yaw rate.
     turn = steer * v / (car.wheelbase_m * (1.0 + (v / _UNDERSTEER_MPS) ** 2))
     columns = [v, v**2, pull, pull**2]

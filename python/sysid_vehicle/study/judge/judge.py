@@ -145,7 +145,7 @@ class Judge:
             together=None if rivals is None else rivals.omnibus,
             candidate=min((c.p_value for c in self.trail.diagnoses[-1].ranking), default=1.0),
             excited=not unexcited(fit.driving.logs),
-            structure=(1.0, 0.0) if pattern is None else (pattern.anywhere, pattern.everywhere),
+            structure=1.0 if pattern is None else pattern.anywhere,
             small=bool(small),
             unopposed=bool(self.added) and rivals is None,
             unforeseen=expected is not None and expected.unforeseen,

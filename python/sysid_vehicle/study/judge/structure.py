@@ -21,6 +21,7 @@ from ...errors import NumericalError
 from ...estimate import MEASURED, Driving
 from ...estimate.driving import WORDS
 from ...identify import Fit, driving_of
+from ..ahead.horizons import ALONG
 from ..ahead.waterfall import all_ahead
 
 _AHEAD_S = (1.0, 5.0)
@@ -94,20 +95,22 @@ def _of(fit: Fit, driving: Driving) -> Iterator[tuple[str, Explainable]]:
     except NumericalError:  # the model loses the car: of its errors nothing can be told
         return
     rows = thinned(driving)
-    force = missing.force[rows]
-    names = [f"missing {target}" for target in missing.targets]
+    # Whoever holds a speed answers what is missing along the car with the pull.
+    kept = [i for i, target in enumerate(missing.targets) if target != "F_x"]
+    names = [f"missing {missing.targets[i]}" for i in kept]
+    force = missing.force[rows][:, kept]
     yield from _named(names, driving, inputs, rows, as_float64(force - force.mean(axis=0)))
     for seconds, errors in zip(_AHEAD_S, ahead, strict=True):
-        # Channels that were read at the same samples are regressed together, the speed alone.
+        # Channels read at the same samples are regressed together, those along the car apart.
         alike: dict[tuple[bool, bytes], list[int]] = {}
         there = np.isfinite(errors) & np.isfinite(driving.measured)
         for j, channel in enumerate(MEASURED):
-            alike.setdefault((channel == "vx_mps", there[:, j].tobytes()), []).append(j)
-        before = Inputs.of(fit, driving, driving, speed_until_s=seconds).train
-        for (of_speed, _), few in alike.items():
+            alike.setdefault((channel in ALONG, there[:, j].tobytes()), []).append(j)
+        before = Inputs.of(fit, driving, driving, along_until_s=seconds).train
+        for (along, _), few in alike.items():
             rows = np.flatnonzero(there[:, few[0]])
             names = [f"error of {WORDS[MEASURED[j]]} {seconds:g} s ahead" for j in few]
-            known = before if of_speed else inputs
+            known = before if along else inputs
             yield from _named(names, driving, known, rows, as_float64(errors[rows][:, few]))
 
 

@@ -22,7 +22,7 @@ def facts_of(
     candidate: float,
     excited: bool,
     small: bool = False,
-    structure: tuple[float, float] = (1.0, 0.0),
+    structure: float = 1.0,
     unopposed: bool = False,
     unforeseen: bool = False,
     slow: tuple[str, ...] = (),

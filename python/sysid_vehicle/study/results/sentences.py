@@ -197,9 +197,16 @@ def _within(study: Study) -> str:
 
 
 def structured(study: Study) -> bool:
-    """Whether a function of the driving is shown to predict a part of what is left."""
-    found = study.structure
-    return found is not None and found.everywhere > study.rules.explainable
+    """Whether a function of the driving is shown to predict a part of what is left.
+
+    Beside other evidence that something is left: alone it may be a driver who steers against
+    disturbances (`rules.something_left`).
+    """
+    found, level = study.structure, study.rules.level
+    left = study.omnibus.rejects or any(c.p_value < level for c in study.diagnoses[-1].ranking)
+    return (
+        found is not None and found.everywhere > study.rules.explainable and (left or _more(study))
+    )
 
 
 def _on_train(study: Study) -> str:
