@@ -5,8 +5,18 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from sysid_vehicle import Driving, Fit, Log, Model, drive, identify, manoeuvres
-from sysid_vehicle.diagnose import Omnibus, omnibus
+from sysid_vehicle import (
+    Driving,
+    Fit,
+    Log,
+    Model,
+    RoadDisturbance,
+    SensorNoise,
+    drive,
+    identify,
+    manoeuvres,
+)
+from sysid_vehicle.diagnose import Omnibus, instead, omnibus
 from sysid_vehicle.diagnose.evidence.evidence import Evidence
 from sysid_vehicle.diagnose.unexplained.omnibus import Unknown
 from sysid_vehicle.identify import refine
@@ -70,3 +80,20 @@ def test_it_speaks_plainly() -> None:
     assert str(Omnibus(400.0, 40, 1e-9, "F_x")) == (
         "an error that depends on the driving remains, mostly in F_x (p = 1e-09)"
     )
+
+
+@pytest.mark.parametrize("seed", [7, 8])
+def test_a_driver_who_knows_the_speed_better_than_its_sensor_leaves_nothing(
+    seed: int, truth: Model
+) -> None:
+    """The pull answers slopes before the sensor shows what they do to the speed."""
+    road = manoeuvres.Manoeuvre(
+        *("road", "slopes and bends", 200.0),
+        *(lambda t: 20.0 + 4.0 * np.sin(0.1 * t), lambda t: 4.0 * np.sin(0.35 * t) ** 3),
+        tracks_path=True,
+    )
+    slopes, noise = RoadDisturbance(slope_rad=0.03), SensorNoise(vx_mps=0.1)
+    log = drive(truth, road, seed=seed, rate_hz=50.0, disturbance=slopes, noise=noise)
+    fit = identify(truth, log, starts=1)
+    assert omnibus(fit, fit.driving).p_value > 0.01
+    assert instead(fit, fit.driving, ()).omnibus.p_value > 0.01

@@ -83,13 +83,13 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
     price = rules.price * float(np.log(driving.samples))
     away: dict[str, str] = {}
     copied: set[str] = set()  # by what explains no more than they do
-    tests: list[Omnibus] = []
+    # What the pull tells of slopes may be the driver's knowledge: it competes, and proves nothing.
+    whole = found.strongest([*every, rivals.answered], rivals.besides_slopes, rules)[1]
     known: list[int] = []
     # The most significant first, then what is significant beside it: much leaks into the others.
-    while len(tests) <= len(effects):
+    for _ in range(len(effects) + 1):
         what, test = found.strongest([*every, *known], rivals.hypotheses, rules)
-        tests.append(test)
-        if not test.rejects:
+        if not (whole.rejects and test.rejects):
             break
         columns, beside = rivals.hypotheses[what], [*every, *known]
         of = {e: [i for i in every if names[i].split(".")[0] == e] for e in effects}
@@ -105,7 +105,7 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
         else:
             copied.update(taken)
         known += [c for c in columns if c not in known]
-    return Instead(tests[0], away)
+    return Instead(whole, away)
 
 
 class Rivals:
@@ -117,6 +117,8 @@ class Rivals:
         Columns of each unknown; one by one and all of one kind together.
     targets : dict of str to str
         By kind, what it acts on most.
+    answered : int
+        The column by which the pull tells of slopes (`Unknown`).
 
     Parameters
     ----------
@@ -156,6 +158,7 @@ class Rivals:
             target = self._flexible.names[group.start]
             what = f"error of {target}" if target in READINGS else target
             self._note(what, target, group)
+        self.answered = len(names) + self._flexible.answered
         for axle in AXLES:
             self._note(f"side force of the {axle} axle", "F_y", slice(0, len(_SLIPS_RAD)))
         for force in forces:
@@ -171,6 +174,12 @@ class Rivals:
         self.hypotheses[what] = several
         self.hypotheses |= {f"{what}{_ONE_OF}{i}": [c] for i, c in enumerate(several)}
         self.width += len(several)
+
+    @property
+    def besides_slopes(self) -> dict[str, list[int]]:
+        """Hypotheses without the column by which the pull tells of slopes."""
+        own = ((what, [i for i in c if i != self.answered]) for what, c in self.hypotheses.items())
+        return {what: few for what, few in own if few}
 
     @property
     def kinds(self) -> npt.NDArray[np.intp]:

@@ -4,6 +4,10 @@ Signals of speed, acceleration and steering, as virtual forces, moments, acceler
 shifts, are scored together after projection on all the model can already do (a portmanteau score
 test; Lin, Biometrika 1997). Signals are built from what was known one sample earlier: the noise of
 a measurement must not enter its own prediction.
+
+No slope of a road depends on the pull. But whoever holds a speed answers slopes with the pull, and
+may know the speed better than its sensor does: what the pull then tells of slopes is no evidence,
+and is taken off all other directions.
 """
 
 from __future__ import annotations
@@ -34,6 +38,8 @@ LEAST_LEFT = 1e-3
 _TARGETS = {**FORCES, "dv_x/dt": 3, "dv_y/dt": 4, **READINGS}
 
 _FORWARD, _SIDEWAYS, _TURNING = ("vx_mps", "ax_mps2"), ("vy_mps", "ay_mps2"), ("yaw_rate_radps",)
+_SLOPE, _PULL = "dv_x/dt", 3  # the acceleration that no accelerometer feels, and its signal
+
 _MOVES = {
     **dict.fromkeys(("F_x", "dv_x/dt", "a_x"), _FORWARD),
     **dict.fromkeys(("F_y", "dv_y/dt", "a_y"), _SIDEWAYS),
@@ -178,6 +184,17 @@ class Unknown:
         firsts = [i for i, n in enumerate(self.names) if n not in self.names[:i]]
         return [slice(a, b) for a, b in pairwise([*firsts, self.width])]
 
+    @property
+    def answered(self) -> int:
+        """The column by which the pull tells of slopes."""
+        return self.names.index(_SLOPE) + _PULL
+
+    def _kept(self, projected: Directions) -> npt.NDArray[np.bool_]:
+        """Of which of all directions something is left, but for what the pull tells of slopes."""
+        kept = not_copied(projected)
+        kept[projected.place(self).start + self.answered] = False
+        return kept
+
     def tested(self, projected: Directions) -> tuple[list[str], FloatArray, list[int]]:
         """Targets of which something is left; least squares along all and along each, their ranks.
 
@@ -185,7 +202,10 @@ class Unknown:
         """
         place = projected.place(self)
         information, S = projected.information[place, place], projected.score[place]
-        kept = np.flatnonzero(not_copied(projected)[place])
+        copy = information[self.answered] / max(information[self.answered, self.answered], 1e-300)
+        S = S - copy * S[self.answered]
+        information = information - np.outer(copy, information[self.answered])
+        kept = np.flatnonzero(self._kept(projected)[place])
         names = [self.names[i] for i in kept]
         targets = list(dict.fromkeys(names))
         tested = [kept, *(kept[[n == t for n in names]] for t in targets)]
@@ -193,6 +213,7 @@ class Unknown:
         for value, columns in zip(values.T, tested, strict=True):
             inverse, rank = pseudo_inverse(information[np.ix_(columns, columns)])
             value[columns] = inverse @ S[columns]
+            value[self.answered] = -copy[columns] @ value[columns]
             ranks.append(rank)
         return targets, values, ranks
 
@@ -206,7 +227,7 @@ class Unknown:
         place = projected.place(self)
         spans = [
             (slice(g.start - place.start, g.stop - place.start), turns)
-            for g, turns in projected.spans(not_copied(projected))
+            for g, turns in projected.spans(self._kept(projected))
             if turns.shape[1]
         ]
         ends = np.cumsum([0, *(turns.shape[1] for _, turns in spans)])
