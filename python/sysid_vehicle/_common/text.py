@@ -39,8 +39,11 @@ def interval_95(
 ) -> tuple[float, float]:
     """The 95 % interval of a value, as far as its bounds allow: no length is negative.
 
-    A value beyond its bounds, as a linear prediction may be, has the nearer bound alone.
+    A value beyond its bounds, as a linear prediction may be, has the nearer bound alone. Of one
+    that is not known at all, as the slip at the peak of a tyre without one, it is the bounds.
     """
+    if not isfinite(std):
+        return bounds
     return within((value - HALF_95 * std, value + HALF_95 * std), bounds)
 
 

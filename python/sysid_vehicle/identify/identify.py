@@ -19,6 +19,7 @@ from ..log import LEAST_USABLE_S, Log, check_car, check_excitation, copies
 from ..model import Model
 from .ahead.ahead import predicting_ahead
 from .beside_noise import beside_noise
+from .contained import above_contained
 from .fit import Fit
 from .intervals.estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .maximum import (
@@ -164,6 +165,24 @@ def maximised(
         As in `identify`.
     """
     _check(model, driving)
+
+    def maximum(model: Model) -> Fit:
+        return _maximised(model, driving, starts, method, seed, workers, progress, ends)
+
+    fit = maximum(model)
+    return fit if np.isfinite(ends) else above_contained(fit, model, maximum)
+
+
+def _maximised(
+    model: Model,
+    driving: Driving,
+    starts: int,
+    method: str,
+    seed: int,
+    workers: int | None,
+    progress: bool | None,
+    ends: float,
+) -> Fit:
     names = model.free_names
     box = free_box(model)
     p = model.vector()

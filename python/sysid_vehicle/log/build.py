@@ -13,6 +13,7 @@ from ..vehicle import Vehicle
 from . import checks
 from .channels import CHANNELS
 from .columns import Columns, collect
+from .frozen import blank_frozen
 from .grid import at, check_time, own_period, to_grid
 from .held import blank_held
 from .laws.plausibility import check_coherence
@@ -81,6 +82,8 @@ def _build(
         columns = blank_held(columns, 1.0 / float(np.median(np.diff(time_s))), notes)
         columns = blank_standing(columns, time_s, notes)
     notes += checks.nan_block_notes(time_s, columns)
+    if check:
+        columns = blank_frozen(columns, time_s, notes)
     for channel in despike:
         if channel not in columns:
             raise InvalidInput(f"{channel}: is to be despiked but is absent; remove the request")
@@ -191,6 +194,6 @@ def _check(
     dull = checks.excitation_note(channels, rate_hz)
     notes += checks.low_rate_note(rate_hz)
     notes += checks.placeholder_notes(channels, excited=not dull)
-    notes += checks.frozen_notes(channels, rate_hz, excited=not dull)
+    notes += checks.constant_notes(channels, excited=not dull)
     # Of single manoeuvres it is asked where they are used, of all together (`check_excitation`).
     notes += [dull] if dull and usable >= LEAST_USABLE_S else []

@@ -1,4 +1,4 @@
-"""Checks that warn: holes, frozen sensors, and drives in which nothing happens."""
+"""Checks that warn: holes, constant channels, and drives in which nothing happens."""
 
 from __future__ import annotations
 
@@ -12,13 +12,10 @@ from .grid import between, own_period
 from .signals import runs, smoothed
 
 _NAN_BLOCK_S = 0.5
-_FROZEN_S = 1.0
 _MIN_RATE_HZ = 20.0
 _EXCITED_AY_MPS2 = 0.5
 _EXCITED_STEER_RAD = 0.002
 _CORNERING_MPS2 = 2.0  # no crossfall and no wind alone
-# What a channel must have missed, in its reference's unit, before a constant run counts as frozen.
-_FROZEN_MISSES = {"ay_mps2": 1.0, "yaw_rate_radps": 1.0, "vx_mps": 2.0, "ax_mps2": 2.0}
 
 
 def nan_block_notes(time_s: FloatArray, columns: Mapping[str, FloatArray]) -> list[str]:
@@ -99,15 +96,14 @@ def placeholder_notes(channels: dict[str, FloatArray], excited: bool) -> list[st
     return [note]
 
 
-def frozen_notes(columns: Mapping[str, FloatArray], rate_hz: float, excited: bool) -> list[str]:
-    """Return one note per channel that is constant while the car demonstrably moves.
+def constant_notes(columns: Mapping[str, FloatArray], excited: bool) -> list[str]:
+    """Return one note per channel that is constant over the whole log.
 
-    Without lateral excitation the lateral channels may well be constant, so only the others are
-    looked at then.
+    Without lateral excitation the lateral channels may well be, so only the others are looked at
+    then.
     """
     time_s = columns["time_s"]
     lateral = ("steer_rad", "yaw_rate_radps", "ay_mps2", "vy_mps")
-    references = _references(columns, rate_hz)
     notes = []
     for name in CHANNELS:
         if name == "time_s" or name not in columns or (name in lateral and not excited):
@@ -120,42 +116,7 @@ def frozen_notes(columns: Mapping[str, FloatArray], rate_hz: float, excited: boo
                 f"check the sensor and the column"
                 + (", or leave it out" if CHANNELS[name].without else "")
             )
-        elif name in references:
-            a, b = _longest_frozen(values, references[name], _FROZEN_MISSES[name], rate_hz)
-            if b > a:
-                notes.append(
-                    f"{name}: frozen at {values[a]:.6g} at {between(a, b, time_s)} while the car "
-                    f"moves on; empty these cells so that they count as missing"
-                )
     return notes
-
-
-def _references(columns: Mapping[str, FloatArray], rate_hz: float) -> dict[str, FloatArray]:
-    """Return for some channels another one that cannot move while they stand still."""
-    width = round(0.2 * rate_hz)
-    references = {
-        "ay_mps2": smoothed(filled(columns["vx_mps"]) * filled(columns["yaw_rate_radps"]), width),
-        "yaw_rate_radps": smoothed(columns["ay_mps2"], width),
-    }
-    if "ax_mps2" in columns:
-        ax = smoothed(columns["ax_mps2"], width)
-        references["vx_mps"] = ax
-        speed = smoothed(columns["vx_mps"], width)
-        references["ax_mps2"] = np.gradient(speed, 1.0 / rate_hz)
-    return references
-
-
-def _longest_frozen(
-    values: FloatArray, reference: FloatArray, miss: float, rate_hz: float
-) -> tuple[int, int]:
-    """Return the longest run of equal values over which `reference` varies by more than `miss`."""
-    shortest = _FROZEN_S * rate_hz
-    best = (0, 0)
-    for a, b in runs(np.diff(values) == 0.0):
-        stop = b + 1
-        if stop - a > max(shortest, best[1] - best[0]) and np.ptp(reference[a:stop]) > miss:
-            best = (a, stop)
-    return best
 
 
 def usable_seconds(columns: Mapping[str, FloatArray], rate_hz: float) -> float:

@@ -16,7 +16,7 @@ _SPIKE_APPROACH = 3.0  # and it exceeds by this factor the steps just before and
 _SPIKE_WINDOW = 51
 # A sensor that drops out stands at one value, which it jumps to and from this many times as far as
 # it steps anywhere else; of all samples these are at most that share.
-_STANDS_JUMP, _STANDS_SHARE = 5.0, 0.05
+STANDS_JUMP, _STANDS_SHARE = 5.0, 0.05
 # Speeds at which the model is run, and the share of its usual top speed for a slow car.
 _LEAST_MPS, _LEAST_ANY_MPS, _LEAST_SHARE = 3.0, 1.0, 0.4
 
@@ -129,7 +129,7 @@ def standing(values: FloatArray, fewest: int = 3) -> np.ndarray:
     size = np.abs(step)
     tail = np.sort(size[size > 0.0])[-max(3, round(_STANDS_SHARE * size.size)) :]
     ratio = tail[1:] / tail[:-1] if tail.size > 1 else tail[:0]
-    if ratio.size == 0 or ratio.max() < _STANDS_JUMP:
+    if ratio.size == 0 or ratio.max() < STANDS_JUMP:
         return none
     jump = np.where(size >= tail[1 + int(np.argmax(ratio))], np.sign(step), 0.0)
     jumps = np.flatnonzero(jump)

@@ -15,8 +15,8 @@ from .channels import CHANNELS
 from .grid import between
 from .signals import runs, standing
 
-_STATES = ("vx_mps", "vy_mps", "yaw_rate_radps")
-_CREEP_MPS = 1.0  # below, many sensors of speed read zero: it is no dropout
+STATES = ("vx_mps", "vy_mps", "yaw_rate_radps")
+CREEP_MPS = 1.0  # below, many sensors of speed read zero: it is no dropout
 
 
 def blank_standing(
@@ -34,7 +34,7 @@ def blank_standing(
         Where the warnings go.
     """
     result = dict(columns)
-    for name in _STATES:
+    for name in STATES:
         found = standing(columns[name]) if name in columns else np.empty(0, dtype=np.intp)
         if found.size == 0:
             continue
@@ -43,7 +43,7 @@ def blank_standing(
         known = np.flatnonzero(np.isfinite(columns[name]))
         for a, b in runs(lost):
             before = columns[name][known[np.searchsorted(known, a) - 1]]
-            if name == "vx_mps" and abs(columns[name][a] - before) < _CREEP_MPS:
+            if name == "vx_mps" and abs(columns[name][a] - before) < CREEP_MPS:
                 lost[a:b] = False
         blocks = runs(lost)
         if not blocks:

@@ -157,6 +157,7 @@ def test_no_interval_passes_a_bound_of_its_parameter() -> None:
     # Ends of a profile that found none are those of the bounds.
     open_ended = replace(length, ends=(-np.inf, 0.4))
     assert open_ended.interval == (0.0, 0.4)
+    assert replace(length, value=np.inf, std=np.inf, bounds=(0.0, np.inf)).interval == (0.0, np.inf)
     held = replace(length, value=0.0, std=np.inf)
     assert held.interval == (0.0, 2.0)
     assert held.interval_text() == "-"

@@ -180,11 +180,11 @@ WARNINGS: dict[str, tuple[Change, list[str]]] = {
     "constant force": (put("fx_n", slice(None), 0.0), ["fx_n: constant (0)", "leave it out"]),
     "frozen yaw rate": (
         freeze("yaw_rate_radps", slice(1000, 1300)),
-        ["yaw_rate_radps: frozen", "samples 1000 to 1299", "empty these cells"],
+        ["yaw_rate_radps: frozen", "samples 1000 to 1299", "300 samples count as missing"],
     ),
     "frozen ay": (
         freeze("ay_mps2", slice(1000, 1300)),
-        ["ay_mps2: frozen", "samples 1000 to 1299 (t = 10 to 12.99 s)", "empty these cells"],
+        ["ay_mps2: frozen", "samples 1000 to 1299 (t = 10 to 12.99 s)", "check the sensor"],
     ),
     "rows lost": (
         lambda data: rows(np.delete(np.arange(4000), slice(1000, 1100)))(data),  # type: ignore[arg-type]

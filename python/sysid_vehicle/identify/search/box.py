@@ -11,9 +11,10 @@ from ...model import Model
 from .objective import LinearRows, Objective, gaussian_prior
 from .search import Box
 
-# Of the typical size of a lag, its smallest: precise sensors tell a twentieth of it from none. Of
-# several lags of one effect some may not be there at all.
-_NEXT_TO_NONE, _ONE_OF_SEVERAL = 0.01, 1e-3
+# Of the typical size of a lag, its smallest. What the likelihood loses by it goes with its size:
+# precise sensors tell a hundredth from none, and a model is not to end below the one without the
+# lag. Lags have their exact solution however short they are.
+_NEXT_TO_NONE = 1e-4
 
 
 def free_box(model: Model) -> Box:
@@ -27,8 +28,7 @@ def free_box(model: Model) -> Box:
         part = next((e for e in model.parts if n.startswith(f"{e.id}.")), None)
         null = known[n].null_value
         if part is not None and part.scored_at_typical and known[n].lower == null:
-            least = _NEXT_TO_NONE if len(part.parameters) == 1 else _ONE_OF_SEVERAL
-            lower[i] = max(lower[i], null + least * (known[n].typical - null))
+            lower[i] = max(lower[i], null + _NEXT_TO_NONE * (known[n].typical - null))
     return Box([known[n].column for n in names], lower, bounds[:, 1])
 
 

@@ -60,7 +60,7 @@ def likelier_noise(
     noise : array, shape (noises,)
         Never less likely than those that are given.
     """
-    best, value = at_top, objective.log_likelihood(*at_top)
+    best, value = _idle_times(objective, at_top, box, few)
     known: list[FloatArray] = []
     for _ in range(_ROUNDS):
         found, reached = _one_round(objective, best, value, box, few, known)
@@ -68,6 +68,50 @@ def likelier_noise(
             return found
         best, value = found, reached  # where other disturbances may be there
     return best
+
+
+def _idle_times(
+    objective: Objective, at_top: tuple[FloatArray, FloatArray], box: Box, few: Objective
+) -> tuple[tuple[FloatArray, FloatArray], float]:
+    """The same maximum, or a likelier one with another time of disturbances that are not there.
+
+    Of a disturbance at its least the likelihood has a maximum at either end of the times, as what
+    is short may be white and what is long a constant, and searches end at the nearer one. Precise
+    sensors tell them apart: a model would end below one that it contains by the time alone.
+
+    Returns
+    -------
+    at_top : (p, noise)
+    log_likelihood : float
+    """
+    p, noise = at_top
+    value = begin = objective.log_likelihood(p, noise)
+    for size, place in _disturbances(noise):
+        if noise[size] <= 0.0 or not _is_nothing(few, p, noise, size):
+            continue
+        for time_s in (objective.lowest[place], objective.highest[place]):
+            trial = noise.copy()
+            trial[[size, place]] = objective.lowest[size], time_s
+            reached = float(objective.log_likelihoods(p[None], trial)[0])
+            if reached > value:
+                noise, value = trial, reached
+    if value < begin + _STANDS:
+        return at_top, begin
+    top = to_the_top(objective, p, noise, box)
+    return top, objective.log_likelihood(*top)
+
+
+def _disturbances(noise: FloatArray) -> Iterator[tuple[int, int]]:
+    """Places of the sizes and of the correlation times."""
+    places = np.arange(noise.size)
+    yield from zip(places[DISTURBANCE].tolist(), places[TIMES].tolist(), strict=True)
+
+
+def _is_nothing(few: Objective, p: FloatArray, noise: FloatArray, size: int) -> bool:
+    """Whether a disturbance takes up so little that its time scale is nothing."""
+    least = noise.copy()
+    least[size] = few.lowest[size]
+    return bool(few.log_likelihoods(p[None], least)[0] > few.log_likelihood(p, noise) - _WORTH)
 
 
 def _one_round(
@@ -112,16 +156,13 @@ def _one_round(
 def _other_times(few: Objective, p: FloatArray, here: Learned) -> Iterator[tuple[int, float]]:
     """Places of correlation times in the noise, and other times; of disturbances that are there."""
     noise = here.noise
-    places = np.arange(noise.size)
-    for size, place in zip(places[DISTURBANCE], places[TIMES], strict=True):
-        least = noise.copy()
-        least[size] = few.lowest[size]
-        if few.log_likelihoods(p[None], least)[0] > few.log_likelihood(p, noise) - _WORTH:
+    for size, place in _disturbances(noise):
+        if _is_nothing(few, p, noise, size):
             continue
         for times in (1.0 / _APART, _APART):
             time_s = float(np.clip(times * noise[place], few.lowest[place], few.highest[place]))
             if max(time_s / noise[place], noise[place] / time_s) >= _OTHER:
-                yield int(place), time_s
+                yield place, time_s
 
 
 def _led(
