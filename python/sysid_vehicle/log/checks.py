@@ -148,11 +148,17 @@ def _references(columns: Mapping[str, FloatArray], rate_hz: float) -> dict[str, 
 def _longest_frozen(
     values: FloatArray, reference: FloatArray, miss: float, rate_hz: float
 ) -> tuple[int, int]:
-    """Return the longest run of equal values over which `reference` varies by more than `miss`."""
+    """Return the longest run of equal values over which `reference` varies by more than `miss`.
+
+    A slower channel is empty between its own samples; where it is empty for longer a run ends.
+    """
     shortest = _FROZEN_S * rate_hz
+    known = np.flatnonzero(np.isfinite(values))
+    apart = np.diff(known)
+    repeated = (np.diff(values[known]) == 0.0) & (apart <= 1.5 * np.median(apart))
     best = (0, 0)
-    for a, b in runs(np.diff(values) == 0.0):
-        stop = b + 1
+    for first, last in runs(repeated):
+        a, stop = int(known[first]), int(known[last]) + 1
         if stop - a > max(shortest, best[1] - best[0]) and np.ptp(reference[a:stop]) > miss:
             best = (a, stop)
     return best

@@ -50,6 +50,21 @@ def freeze(channel: str, where: slice) -> Change:
     return change
 
 
+def slow(channel: str, every: int) -> Change:
+    def change(data: Columns) -> None:
+        data[channel][np.arange(len(data[channel])) % every > 0] = np.nan
+
+    return change
+
+
+def both(first: Change, second: Change) -> Change:
+    def change(data: Columns) -> None:
+        first(data)
+        second(data)
+
+    return change
+
+
 def shorten(data: Columns) -> None:
     data["vx_mps"] = data["vx_mps"][:-1]
 
@@ -185,6 +200,10 @@ WARNINGS: dict[str, tuple[Change, list[str]]] = {
     "frozen ay": (
         freeze("ay_mps2", slice(1000, 1300)),
         ["ay_mps2: frozen", "samples 1000 to 1299 (t = 10 to 12.99 s)", "empty these cells"],
+    ),
+    "frozen yaw rate of a slow channel": (
+        both(freeze("yaw_rate_radps", slice(1000, 1300)), slow("yaw_rate_radps", 5)),
+        ["yaw_rate_radps: frozen", "samples 1000 to 1295", "empty these cells"],
     ),
     "rows lost": (
         lambda data: rows(np.delete(np.arange(4000), slice(1000, 1100)))(data),  # type: ignore[arg-type]
