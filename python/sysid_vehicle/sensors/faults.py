@@ -271,12 +271,13 @@ class _Asked:
         found = self.found
         pick = np.array([1.0 if name in told.of else 0.0 for name in found.faults])
         value = _size(found, pick, found.covariance)[0]
-        std = self._std(told, pick)
-        at_null = _size(found, pick, found.null_covariance)[1]
+        road = found.leaning_with_turns if told.name == "gain_ay" else 0.0
+        std = math.hypot(self._std(told, pick), road)
+        at_null = math.hypot(_size(found, pick, found.null_covariance)[1], road)
         widest = max(std, at_null)
         rival = self._likeliest_without(told)
         claimed = rival is None and abs(value) > max(self.critical * widest, told.negligible)
-        variance = float(pick @ self.naive @ pick)
+        variance = float(pick @ self.naive @ pick) + road**2
         if not claimed:
             # No fault is as likely: its interval is that of no fault, if that is wider.
             std, variance = widest, max(variance, at_null**2)
@@ -288,6 +289,8 @@ class _Asked:
             other = _instead(found, rival.estimate, told)
             another = self._one_of_two(told, rival, other)
             reason = why_not(told.name, other=other, there=bool(another))
+        elif not (claimed or well) and 2.0 * road**2 > widest**2:
+            reason = why_not(told.name, other="road")
         elif not (claimed or well):
             reason = _confounded(told, pick, found, self.naive, list(found.faults))
         return SensorFault(
