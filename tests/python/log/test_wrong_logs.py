@@ -65,6 +65,9 @@ def both(first: Change, second: Change) -> Change:
     return change
 
 
+_TWICE = np.r_[0:2200, 1200:3000]
+
+
 def shorten(data: Columns) -> None:
     data["vx_mps"] = data["vx_mps"][:-1]
 
@@ -204,6 +207,10 @@ WARNINGS: dict[str, tuple[Change, list[str]]] = {
     "frozen yaw rate of a slow channel": (
         both(freeze("yaw_rate_radps", slice(1000, 1300)), slow("yaw_rate_radps", 5)),
         ["yaw_rate_radps: frozen", "samples 1000 to 1295", "empty these cells"],
+    ),
+    "a piece that stands there twice": (
+        lambda data: data.update({c: x[_TWICE] for c, x in data.items() if c != "time_s"}),
+        ["all channels at samples 2200 to 3199", "repeat those at samples 1200 to 2199", "cut"],
     ),
     "rows lost": (
         lambda data: rows(np.delete(np.arange(4000), slice(1000, 1100)))(data),  # type: ignore[arg-type]
