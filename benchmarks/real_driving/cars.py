@@ -31,6 +31,7 @@ PARTS: dict[str, tuple[tuple[tuple[str, float, float], ...], ...]] = {
     ),
     "gti": ((("High_Speed.csv", *WHOLE),), (("Low_Speed.csv", *WHOLE),)),
 }
+LEVEL = ("v40",)  # manoeuvres of standards, on a test ground that is level
 FETCHED = ("v40", "gti")  # logs without a licence, in a folder of their own
 SHORT = "bmw_m8_roadview"  # one lane change: too short to name anything
 NAMES = (*PARTS, SHORT)

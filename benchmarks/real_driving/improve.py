@@ -22,7 +22,7 @@ import warnings
 from pathlib import Path
 
 from ahead import ahead, motion_logs
-from cars import NAMES, logs, vehicle
+from cars import LEVEL, NAMES, logs, vehicle
 
 import sysid_vehicle as sv
 
@@ -31,7 +31,7 @@ def one(name: str, args: argparse.Namespace) -> dict[str, object]:
     began = time.perf_counter()
     train, validation = logs(name, args.data, args.fetched)
     car = vehicle(name, args.data)
-    check = sv.check([*train, *validation], car)
+    check = sv.check([*train, *validation], car, level=name in LEVEL)
     faults = ", ".join(f"{f.name} {f.value:.3g} +- {f.std:.2g}" for f in check.found)
     print(f"  sensors: {faults or 'no fault'} ({time.perf_counter() - began:.0f} s)", flush=True)
     motion = motion_logs(check, validation)

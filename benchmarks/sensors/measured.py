@@ -1,6 +1,7 @@
 """What `sv.check` says of measured logs.
 
     python benchmarks/sensors/measured.py LOG... [--channels MAP] [--between T0 T1]
+        [--level-ground]
 
 Prints one line per fault for all logs together. `--steer-limit` makes larger steering angles
 missing, because the check of a log refuses spikes that are no angle of a car.
@@ -23,11 +24,12 @@ def main() -> None:
     parser.add_argument("logs", nargs="+", type=Path)
     parser.add_argument("--channels", type=Path)
     parser.add_argument("--between", nargs=2, type=float)
+    parser.add_argument("--level-ground", action="store_true", help="as of a test track")
     parser.add_argument("--steer-limit", type=float, default=np.inf)
     args = parser.parse_args()
     logs = [_read(path, args) for path in args.logs]
     began = time.perf_counter()
-    found = sv.check(logs)
+    found = sv.check(logs, level=args.level_ground)
     print(found)
     took = time.perf_counter() - began
     print(f"{took:.1f} s, {found.estimate.rounds} rounds, settled: {found.estimate.settled}")

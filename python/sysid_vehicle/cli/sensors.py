@@ -21,6 +21,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
     parser.add_argument("--vehicle", type=Path, metavar="TOML", help="the car's own numbers")
+    parser.add_argument(
+        "--level-ground",
+        action="store_true",
+        help="the road does not lean with its turns, as on a test track: more is told of ay_mps2",
+    )
     add_reading(parser)
     add_output(
         parser,
@@ -40,7 +45,8 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     vehicle = None if args.vehicle is None else Vehicle.from_toml(args.vehicle)
     if args.map is not None:
         mapping = written_map(args.logs[0], args.map, args.dbc, vehicle).channel_map
-    found = check(read_logs(args.logs, args, vehicle, mapping), vehicle)
+    logs = read_logs(args.logs, args, vehicle, mapping)
+    found = check(logs, vehicle, level=args.level_ground)
     print(found)
     write_figures(args.json, found.to_dict(), heard)
     if args.report is not None:

@@ -195,5 +195,6 @@ def _check(
     notes += checks.low_rate_note(rate_hz)
     notes += checks.placeholder_notes(channels, excited=not dull)
     notes += checks.constant_notes(channels, excited=not dull)
+    notes += checks.repeated_notes(channels, rate_hz)
     # Of single manoeuvres it is asked where they are used, of all together (`check_excitation`).
     notes += [dull] if dull and usable >= LEAST_USABLE_S else []

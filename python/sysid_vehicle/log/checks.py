@@ -12,6 +12,8 @@ from .grid import between, own_period
 from .signals import runs, smoothed
 
 _NAN_BLOCK_S = 0.5
+_REPEATED_S, _REPEATED = 1.0, 20  # so long, and so many rows
+_MIXED = np.uint64(0x9E3779B97F4A7C15)  # odd: channels are not exchanged
 _MIN_RATE_HZ = 20.0
 _EXCITED_AY_MPS2 = 0.5
 _EXCITED_STEER_RAD = 0.002
@@ -117,6 +119,32 @@ def constant_notes(columns: Mapping[str, FloatArray], excited: bool) -> list[str
                 + (", or leave it out" if CHANNELS[name].without else "")
             )
     return notes
+
+
+def repeated_notes(columns: Mapping[str, FloatArray], rate_hz: float) -> list[str]:
+    """Return a note where a piece of a drive stands in the log twice, with times of its own.
+
+    Its rows are alike in all channels, noise and all, and follow each other as the first time. Of
+    rows that stand still each is like the first one: no piece.
+    """
+    time_s = columns["time_s"]
+    key = np.zeros(time_s.size, dtype=np.uint64)
+    for name in CHANNELS:
+        if name in columns and name != "time_s":
+            key = key * _MIXED + columns[name].view(np.uint64)  # modulo 2^64
+    _, first, which = np.unique(key, return_index=True, return_inverse=True)
+    back = np.arange(time_s.size) - first[which]
+    blocks = [(a, b + 1) for a, b in runs((np.diff(back) == 0) & (back[1:] > 0))]
+    a, b = max(blocks, key=lambda block: block[1] - block[0], default=(0, 0))
+    if b - a <= max(_REPEATED_S * rate_hz, _REPEATED):
+        return []
+    start, stop = int(a - back[a]), int(b - back[a])
+    note = (
+        f"time_s: all channels at {between(a, b, time_s)} repeat those at "
+        f"{between(start, stop, time_s)}: a piece of the drive stands there twice; cut the second "
+        f"one out, and read what is before and behind it as separate logs"
+    )
+    return [note]
 
 
 def usable_seconds(columns: Mapping[str, FloatArray], rate_hz: float) -> float:

@@ -91,8 +91,11 @@ def _frozen(
     step = np.diff(values[known])
     # Of a run the steps numbered a to b - 1 are none: it holds the known samples a to b.
     at_s = time_s[known]
-    equal = [(a, b) for a, b in runs(step == 0.0) if at_s[b] - at_s[a] > _FROZEN_S]
-    jumps = _jumps(name, step, np.diff(at_s), equal)
+    apart_s = np.diff(at_s)
+    # A slower channel is empty between its own samples; where it is empty for longer a run ends.
+    on = apart_s <= 1.5 * np.median(apart_s)
+    equal = [(a, b) for a, b in runs((step == 0.0) & on) if at_s[b] - at_s[a] > _FROZEN_S]
+    jumps = _jumps(name, step, apart_s, equal)
     found = []
     for a, b in equal:
         first, stop = int(known[a]), int(known[b]) + 1

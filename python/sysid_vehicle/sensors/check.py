@@ -46,7 +46,11 @@ Faults = tuple[SensorFault, ...]
 
 @typed
 def check(
-    logs: Log | Sequence[Log], vehicle: Vehicle | None = None, *, seed: int = 0
+    logs: Log | Sequence[Log],
+    vehicle: Vehicle | None = None,
+    *,
+    level: bool = False,
+    seed: int = 0,
 ) -> SensorCheck:
     """Check the sensors of a log against each other, before any tyre is assumed.
 
@@ -62,6 +66,9 @@ def check(
         Driving with the same sensors.
     vehicle : Vehicle, optional
         Says how far the IMU can be from the speed sensor, and which faults harm a car of its size.
+    level : bool
+        Whether the ground is level, as a test track: a road that leans with its turns reads as a
+        scale of `ay_mps2`, or as gravity by roll, of which less is told by default.
     seed : int
         Of the draws that teach the noise.
 
@@ -89,7 +96,9 @@ def check(
     told = tuple(signal for log in together for signal in signals(log))
     moments: list[Moment] = []
     while True:
-        found = checked(ready, vehicle, seed=whole(seed, "seed"), told=told, moments=moments)
+        found = checked(
+            *(ready, vehicle), seed=whole(seed, "seed"), told=told, moments=moments, level=level
+        )
         expected = {channel: of for channel, (_, of) in found.noise.items()}
         more = moments_of(found.readings, expected, found.stretches, ready)
         # What several channels feel at once is a blow: it is told once.
@@ -109,6 +118,7 @@ def checked(
     enough: Told = lambda *_: False,
     told: tuple[Signal, ...] | None = None,
     moments: Sequence[Moment] = (),
+    level: bool = False,
 ) -> SensorCheck:
     """As `check` of logs whose noise is white, or no more than its first estimate.
 
@@ -129,7 +139,10 @@ def checked(
     floors = {r.channel: _floor(r, told) for r in readings}
     step_s = _step(readings)
     told_of = partial(
-        faults_of, absent=lacking, wheelbase_m=None if vehicle is None else vehicle.wheelbase_m
+        faults_of,
+        absent=lacking,
+        wheelbase_m=None if vehicle is None else vehicle.wheelbase_m,
+        level=level,
     )
 
     def of(

@@ -218,6 +218,7 @@ def faults_of(
     rivals: Mapping[tuple[str, ...], Rival] | None = None,
     *,
     wheelbase_m: float | None = None,
+    level: bool = False,
 ) -> tuple[SensorFault, ...]:
     """Say what an estimate tells of each fault.
 
@@ -234,10 +235,12 @@ def faults_of(
         unsure in which the two differ.
     wheelbase_m : float, optional
         Of the car; by default an ordinary one.
+    level : bool
+        Whether the road does not lean with its turns.
     """
     every = _TOLD if wheelbase_m is None else tuple(told.in_car(wheelbase_m) for told in _TOLD)
     rows = [t for t in every if t.of[-1] in found.faults]
-    asked = _Asked(found, parts, rivals or {}, _critical(len(rows)), every)
+    asked = _Asked(found, parts, rivals or {}, _critical(len(rows)), every, level)
     return tuple(
         asked.fault(told) if told in rows else _untold(told, why_not(told.name, absent=absent))
         for told in every
@@ -260,6 +263,7 @@ class _Asked:
     rivals: Mapping[tuple[str, ...], Rival]
     critical: float
     every: Sequence[_Told]
+    level: bool
 
     @cached_property
     def naive(self) -> np.ndarray:
@@ -271,12 +275,14 @@ class _Asked:
         found = self.found
         pick = np.array([1.0 if name in told.of else 0.0 for name in found.faults])
         value = _size(found, pick, found.covariance)[0]
-        std = self._std(told, pick)
-        at_null = _size(found, pick, found.null_covariance)[1]
+        leans = told.name == "gain_ay" and not self.level
+        road = found.leaning_with_turns if leans else 0.0
+        std = math.hypot(self._std(told, pick), road)
+        at_null = math.hypot(_size(found, pick, found.null_covariance)[1], road)
         widest = max(std, at_null)
         rival = self._likeliest_without(told)
         claimed = rival is None and abs(value) > max(self.critical * widest, told.negligible)
-        variance = float(pick @ self.naive @ pick)
+        variance = float(pick @ self.naive @ pick) + road**2
         if not claimed:
             # No fault is as likely: its interval is that of no fault, if that is wider.
             std, variance = widest, max(variance, at_null**2)
@@ -288,6 +294,8 @@ class _Asked:
             other = _instead(found, rival.estimate, told)
             another = self._one_of_two(told, rival, other)
             reason = why_not(told.name, other=other, there=bool(another))
+        elif not (claimed or well) and 2.0 * road**2 > widest**2:
+            reason = why_not(told.name, other="road")
         elif not (claimed or well):
             reason = _confounded(told, pick, found, self.naive, list(found.faults))
         return SensorFault(

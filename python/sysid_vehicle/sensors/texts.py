@@ -54,7 +54,10 @@ _OTHER = {
     "slip.braked": "slip of the wheels whose speed is logged",
     "lean.ax_mps2": "a body that pitches late",
     "lean.ay_mps2": "a body that rolls late",
+    "road": "a road that leans with its turns",
 }
+# What tells it, in place of other driving.
+_ELSEWHERE = {"road": "corners on level ground (`level=True`, `--level-ground`)"}
 ON_CORRECTION = (
     "delay of steer_rad: kinematics does not know the steering",
     "delay of ax_mps2 against yaw_rate_radps: the two meet in vy_mps * yaw_rate_radps alone",
@@ -79,7 +82,7 @@ def why_not(
     """
     if absent:
         return f"because {' and '.join(absent)} {'is' if len(absent) == 1 else 'are'} not logged"
-    would = f"; {_WOULD_TELL[name]} would tell it"
+    would = f"; {_ELSEWHERE.get(other, _WOULD_TELL[name])} would tell it"
     if alone:
         return f"because {_NEEDS_EXCITATION[name]}{would}"
     both = "; one of the two is there" if there else ""

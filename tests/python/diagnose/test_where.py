@@ -11,6 +11,7 @@ import pytest
 from sysid_vehicle import Driving, Fit, Model, drive, identify, manoeuvres, where
 from sysid_vehicle._common.arrays import FloatArray
 from sysid_vehicle.diagnose import Where
+from sysid_vehicle.diagnose.evidence import evidence as evidence_module
 from sysid_vehicle.diagnose.evidence.evidence import Evidence
 from sysid_vehicle.diagnose.unexplained import delay as delay_module
 from sysid_vehicle.diagnose.unexplained.change_points import change_points
@@ -137,6 +138,21 @@ def test_a_late_steering_is_told(delayed: Where) -> None:
     assert force.delay is not None
     assert not force.delay.significant
     assert delayed.change_points == ()
+
+
+def test_long_driving_is_told_as_short_driving_is(
+    delayed: Where, hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond the samples of which all is held at once the evidence is worked on in pieces."""
+    monkeypatch.setattr(evidence_module, "HELD", 700)
+    pieces = where(hidden_fit("steer_delay.delay_s", 0.04))
+    for a, b in zip(delayed.coherence, pieces.coherence, strict=True):
+        assert (a.delay is None) == (b.delay is None)
+        if a.delay is not None and b.delay is not None:
+            assert b.delay.delay_s == pytest.approx(a.delay.delay_s, abs=0.3 * a.delay.std_s)
+            # Noise of the inputs is drawn once in place of twice.
+            assert b.delay.std_s == pytest.approx(a.delay.std_s, rel=0.3)
+    assert len(pieces.change_points) == len(delayed.change_points)
 
 
 def test_noise_learned_with_the_delay_put_in_needs_no_climb(

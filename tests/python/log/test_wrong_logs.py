@@ -50,6 +50,24 @@ def freeze(channel: str, where: slice) -> Change:
     return change
 
 
+def slow(channel: str, every: int) -> Change:
+    def change(data: Columns) -> None:
+        data[channel][np.arange(len(data[channel])) % every > 0] = np.nan
+
+    return change
+
+
+def both(first: Change, second: Change) -> Change:
+    def change(data: Columns) -> None:
+        first(data)
+        second(data)
+
+    return change
+
+
+_TWICE = np.r_[0:2200, 1200:3000]
+
+
 def shorten(data: Columns) -> None:
     data["vx_mps"] = data["vx_mps"][:-1]
 
@@ -185,6 +203,14 @@ WARNINGS: dict[str, tuple[Change, list[str]]] = {
     "frozen ay": (
         freeze("ay_mps2", slice(1000, 1300)),
         ["ay_mps2: frozen", "samples 1000 to 1299 (t = 10 to 12.99 s)", "check the sensor"],
+    ),
+    "frozen yaw rate of a slow channel": (
+        both(freeze("yaw_rate_radps", slice(1000, 1300)), slow("yaw_rate_radps", 5)),
+        ["yaw_rate_radps: frozen", "samples 1000 to 1295", "296 samples count as missing"],
+    ),
+    "a piece that stands there twice": (
+        lambda data: data.update({c: x[_TWICE] for c, x in data.items() if c != "time_s"}),
+        ["all channels at samples 2200 to 3199", "repeat those at samples 1200 to 2199", "cut"],
     ),
     "rows lost": (
         lambda data: rows(np.delete(np.arange(4000), slice(1000, 1100)))(data),  # type: ignore[arg-type]

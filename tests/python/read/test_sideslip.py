@@ -59,6 +59,31 @@ def test_a_mirrored_lateral_speed_is_turned_round(right: sv.Log) -> None:
     np.testing.assert_allclose(log["vy_mps"], right["vy_mps"], atol=1e-12)
 
 
+@pytest.mark.parametrize("factor", [1.0, 1.0 / 3.6, -1.0])
+def test_its_unit_is_that_of_the_speed_or_metres_per_second(factor: float) -> None:
+    """On a road that leans, with a body that does, its change follows no other channel."""
+    t = np.arange(0.0, 240.0, 0.02)
+    noise = np.random.default_rng(5).standard_normal((6, t.size))
+    speed = 18.0 + 8.0 * np.sin(0.05 * t)
+    yaw = 3.0 * np.sin(0.21 * t) * np.sin(0.033 * t) / speed
+    ay = speed * yaw
+    lateral = 1.4 * yaw - 0.005 * ay * speed + 0.03 * noise[1]
+    bank = 0.4 * np.sin(0.021 * t) ** 2 * np.sign(yaw)
+    proposed = sv.propose_channels(
+        {
+            "t": t,
+            "speed_kmh": 3.6 * (speed + 0.03 * noise[0]),
+            "vy": lateral / factor,
+            "yaw_rate_degps": (yaw + 0.002 * noise[2]) / DEG,
+            "ax_g": (np.gradient(speed, t) + 0.06 * noise[3]) / 9.80665,
+            "ay_g": (1.12 * ay - bank + 0.06 * noise[4]) / 9.80665,
+            "steering_wheel_angle_deg": 15.0 * (2.7 * yaw / speed + 0.002 * ay) / DEG,
+        }
+    ).channels["vy_mps"]
+    assert proposed.factor == pytest.approx(factor)
+    assert "unit found by the laws of motion" in proposed.why
+
+
 @pytest.mark.parametrize(
     "name", ["slip angle FL", "rear slip angle", "slip ratio", "beta_dot", "tyre slip angle"]
 )

@@ -281,6 +281,7 @@ def _through(evidence: Evidence, inputs: FloatArray, which: int, signal: FloatAr
     step = _SMALL * float(np.std(inputs[:, which])) / max(float(np.std(signal)), 1e-300)
     moved = inputs.copy()
     moved[:, which] += step * signal
-    problem = evidence.driving.problem(evidence.fit.model, other_inputs=moved)
+    # Cut into pieces as the evidence is: gains that are held are those of its pieces.
+    problem = evidence.problem_of(moved)
     after = problem.residuals(evidence.fit.model.vector(), evidence.frozen).ravel()
     return as_float64((evidence.residual - after) / step)

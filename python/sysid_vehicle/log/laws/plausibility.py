@@ -50,6 +50,7 @@ from .longitudinal import check_force, check_longitudinal, held_speed_note
 from .motion import Motion
 from .over_ground import check_over_ground
 from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
+from .rear_axle import check_rear_axle
 from .regression import in_most, size_of
 from .swapped_speeds import check_swapped_speeds
 from .wheelbase import check_steering, gripping, is_model_car
@@ -182,6 +183,7 @@ def _check_laws(drive: Drive, model_car: bool) -> tuple[list[Contradiction], lis
     doubtful = [] if clock else check_steering(drive)
     if "vy_mps" in channels:
         doubtful += _check_sliding(drive)
+        check_rear_axle(drive)
     # Without the lateral speed nothing tells what a slide takes from the speed.
     driven = drive if "vy_mps" in channels else gripping(drive)
     if driven is not None and "ax_mps2" in channels:

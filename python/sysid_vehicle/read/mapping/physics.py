@@ -20,7 +20,7 @@ from ...log.laws.laws import LINEAR_MPS2, cosine, fit
 from ...log.laws.motion import Windows
 from ...vehicle import GRAVITY_MPS2
 from .look import with_gaps
-from .sideslip import against_the_rear_axle, usual_sideslip
+from .sideslip import against_the_rear_axle, factor_by_the_rear_axle, usual_sideslip
 
 _DEG, _G = math.pi / 180.0, GRAVITY_MPS2
 _WINDOW_S, _SHORT_S = 1.0, 0.2
@@ -134,11 +134,15 @@ def sideways(
         said.append("sideslip angle: the lateral speed is vx_mps tan(angle)")
     if factor is None:
         told = None if angle or not moves else _lateral_unit(longer, factors)
-        factor = abs(factors.get("vx_mps", 1.0)) if told is None else told
+        as_vx = abs(factors.get("vx_mps", 1.0))
+        if told is None and moves and not angle and as_vx != 1.0:
+            slow = column[rows], speed[rows], yaw[rows], 0.5 * _SHORT_S
+            told = factor_by_the_rear_axle(*slow, (1.0, as_vx))
+        factor = as_vx if told is None else told
         if angle:
             ratio = _large(column[rows]) / _large(usual)
             factor = min((1.0, _DEG), key=lambda f: abs(math.log(max(f * ratio, 1e-9))))
-        if factor != 1.0:
+        if factor != 1.0 or as_vx != 1.0:
             by_law = "unit found by the laws of motion" if told else "unit as that of vx_mps"
             said.append("unit found by its size" if angle else by_law)
     lateral = factor * column * (speed if angle else 1.0)

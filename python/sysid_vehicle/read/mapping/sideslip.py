@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
@@ -54,15 +56,52 @@ def against_the_rear_axle(
     apart_s : float
         Between these samples [s].
     """
+    right, turned = _costs(lateral, speed, yaw, apart_s, (1.0, -1.0))
+    return turned < right - _TELLS
+
+
+def factor_by_the_rear_axle(
+    column: FloatArray,
+    speed: FloatArray,
+    yaw: FloatArray,
+    apart_s: float,
+    tried: Sequence[float],
+) -> float | None:
+    """The factor that makes a lateral speed of a column, where one is clearly the likeliest.
+
+    Parameters
+    ----------
+    column, speed, yaw, apart_s
+        As for `against_the_rear_axle`, the lateral speed in a unit and of a sign not known.
+    tried : sequence of float
+        Factors, all positive.
+    """
+    costs = _costs(column, speed, yaw, apart_s, [s * f for f in tried for s in (1.0, -1.0)])
+    of_each = np.min(np.reshape(costs, (-1, 2)), axis=1)
+    first, second = np.sort(of_each)[:2]
+    return tried[int(np.argmin(of_each))] if first < second - _TELLS else None
+
+
+def _costs(
+    column: FloatArray,
+    speed: FloatArray,
+    yaw: FloatArray,
+    apart_s: float,
+    factors: Sequence[float],
+) -> list[float]:
+    """Twice the negative logarithm of the probability of a column, for each factor."""
     design = np.column_stack([yaw, speed**2 * yaw, speed])
     inverse = np.linalg.pinv(design.T @ design)
-    found = inverse @ (design.T @ lateral)
-    residual = lateral - design @ found
-    free = max(len(lateral) * min(apart_s / _LASTS_S, 1.0) - len(found), 1.0)
-    covariance = np.diag(_SPREAD**2) + inverse * float(residual @ residual) / free
+    found = inverse @ (design.T @ column)
+    residual = column - design @ found
+    free = max(len(column) * min(apart_s / _LASTS_S, 1.0) - len(found), 1.0)
+    noise = inverse * float(residual @ residual) / free
 
-    def cost(sign: float) -> float:
-        off = sign * found - _USUAL
-        return float(off @ np.linalg.solve(covariance, off))
+    def cost(factor: float) -> float:
+        covariance = np.diag(_SPREAD**2) + factor**2 * noise
+        off = factor * found - _USUAL
+        # The factor is that of a density, too: what is found is made of the column by it.
+        room = np.linalg.slogdet(covariance)[1] - 2.0 * len(found) * np.log(abs(factor))
+        return float(off @ np.linalg.solve(covariance, off) + room)
 
-    return cost(-1.0) < cost(1.0) - _TELLS
+    return [cost(factor) for factor in factors]

@@ -99,6 +99,17 @@ class Estimate:
         """Slip per acceleration of wheels whose speed is logged [s2/m]; empty where none is."""
         return {name: x for name, x in self.faults.items() if name in SLIPS}
 
+    @property
+    def leaning_with_turns(self) -> float:
+        """The scale of a_y that a road has which leans with its turns as it leans elsewhere.
+
+        Roads are built to lean with their turns. That part reads as a scale of a_y, and what is
+        left of the road tells how large it may be: on level ground nothing.
+        """
+        vx, yaw, bank = (self.x[self.grid.index[name]] for name in ("vx", "yaw", "bank"))
+        turning = float(np.std(vx * yaw))
+        return float(np.std(bank)) / turning if turning > 0.0 else 0.0
+
     def draw(
         self, count: int, seed: int | np.random.Generator = 0
     ) -> tuple[FloatArray, FloatArray]:
