@@ -16,7 +16,7 @@ from .fit import Fit
 from .intervals.estimates import box_covariance, wald
 from .intervals.retimed import pushes_of_time
 from .offsets import marginal_information
-from .search.box import free_box, objective_of
+from .search.box import NO_LAG, free_box, objective_of
 from .search.climb import FAR_BELOW, to_the_top
 from .search.objective import Objective
 from .search.other_noise import likelier_noise
@@ -96,7 +96,7 @@ def refine_above(
             return None
         new = np.array([n not in fit.model.free_names for n in model.free_names])
         # Few samples lead to no lag, which is the poorer model: from there no search leads back.
-        none = bool(np.any(new & (led[0][box.columns] <= box.lower)))
+        none = bool(np.any(new & (led[0][box.columns] <= free_box(model, NO_LAG).lower)))
         led_on = log_likelihood_of(objective, *led) > log_likelihood_of(objective, *begin)
         if none and led_on and least > fit.log_likelihood:
             return None

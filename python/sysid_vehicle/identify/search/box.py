@@ -15,10 +15,19 @@ from .search import Box
 # precise sensors tell a hundredth from none, and a model is not to end below the one without the
 # lag. Lags have their exact solution however short they are.
 _NEXT_TO_NONE = 1e-4
+NO_LAG = 0.01
+"""Of its typical size, what few samples leave of a lag that is not there."""
 
 
-def free_box(model: Model) -> Box:
-    """The model's free parameters, in the order of their names."""
+def free_box(model: Model, least: float = _NEXT_TO_NONE) -> Box:
+    """The model's free parameters, in the order of their names.
+
+    Parameters
+    ----------
+    model : Model
+    least : float
+        The smallest lag, of its typical size.
+    """
     names = list(model.free_names)
     known = model.parameters
     bounds = np.array([model.bounds(n) for n in names])
@@ -28,7 +37,7 @@ def free_box(model: Model) -> Box:
         part = next((e for e in model.parts if n.startswith(f"{e.id}.")), None)
         null = known[n].null_value
         if part is not None and part.scored_at_typical and known[n].lower == null:
-            lower[i] = max(lower[i], null + _NEXT_TO_NONE * (known[n].typical - null))
+            lower[i] = max(lower[i], null + least * (known[n].typical - null))
     return Box([known[n].column for n in names], lower, bounds[:, 1])
 
 

@@ -1,8 +1,9 @@
 """The sign of the lateral speed, by the slip of the rear axle in slow driving.
 
-``vy / vx = d yaw_rate / vx - K ay + constant``, with the distance ``d`` of the speed sensor ahead
-of the rear axle and the compliance ``K`` of that axle. Where the car hardly slides the change of
-``vy`` drowns in gravity by roll and by roads that lean; this law holds all the same.
+``vy / vx = d yaw_rate / vx - K ay + J d(yaw_rate)/dt + constant``, with the distance ``d`` of the
+speed sensor ahead of the rear axle, the compliance ``K`` of that axle, and what turns the car with
+its side force. Where the car hardly slides the change of ``vy`` drowns in gravity by roll and by
+roads that lean; this law holds all the same.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def check_rear_axle(drive: Drive) -> None:
     if spread_of(ay) < EXCITED:
         return
     curvature, side = drive.mean(c["yaw_rate_radps"]) / speed, drive.mean(c["vy_mps"]) / speed
-    found = fit(side, [curvature, ay, ones(drive)], [np.inf, np.inf, np.inf])
+    turning = drive.change(c["yaw_rate_radps"])
+    found = fit(side, [curvature, ay, turning, ones(drive)], [np.inf] * 4)
     (ahead, compliance), sure = found.coefficients[:2], _SURE * found.deviations[:2]
     if found.coherence > _CLOSELY and ahead < -sure[0] and compliance > sure[1]:
         text = "goes against the yaw rate in slow corners and with ay_mps2 in quick ones"
