@@ -154,9 +154,11 @@ def _left(study: Study) -> str:
     if stand_ins:
         said += f" Other effects have absorbed what is missing: {', '.join(stand_ins)}."
     elif study.diagnoses[-1].significant:
-        some = ", ".join(c.id for c in study.diagnoses[-1].significant[:3])
+        some = [c.id for c in study.diagnoses[-1].significant[:3]]
+        they = "it does" if len(some) == 1 else "they do"
         said += (
-            f" There is evidence for {some}; they do not improve the prediction of validation data."
+            f" There is evidence for {', '.join(some)}; {they} not improve the prediction of "
+            "validation data."
         )
     return said
 
