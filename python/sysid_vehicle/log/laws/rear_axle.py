@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .laws import EXCITED, Drive, fit, ones, spread_of, wrong_sign
+from .laws import EXCITED, LINEAR_MPS2, Drive, fit, ones, spread_of, wrong_sign
 
 _CLOSELY = 0.5  # coherence
+_MANY = 60  # windows: in one corner a curvature and an acceleration say the same
 _SURE = 5.0  # standard errors
 
 
@@ -28,6 +29,10 @@ def check_rear_axle(drive: Drive) -> None:
         If both are turned round.
     """
     c = drive.motion.channels
+    linear = np.abs(drive.motion.mean(c["ay_mps2"])) < LINEAR_MPS2
+    drive = Drive(drive.motion, drive.rows & linear)
+    if np.count_nonzero(drive.rows) < _MANY:
+        return
     ay, speed = drive.mean(c["ay_mps2"]), drive.mean(c["vx_mps"])
     if spread_of(ay) < EXCITED:
         return
