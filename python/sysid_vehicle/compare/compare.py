@@ -232,7 +232,7 @@ def compare(
     for own, _, _, trace in _told(fit, driving, fit.noise):
         innovation[own], spread[own] = trace["innovation"], trace["spread"]
         log_likelihood += trace["log_likelihood"]
-    wrong = incoherent(driving, fit.model) or unrelated(driving, innovation, spread)
+    wrong = incoherent(driving, fit.model, fit.noise) or unrelated(driving, innovation, spread)
     squares, count = np.empty(driving.samples), np.empty(driving.samples)
     for own, squares[own], count[own], trace in _told(fit, driving, floor):
         innovation[own], spread[own] = trace["innovation"], trace["spread"]

@@ -13,7 +13,7 @@ import numpy as np
 
 from .._common.arrays import FloatArray
 from .._common.text import number
-from ..estimate import MEASURED, Driving
+from ..estimate import MEASURED, Driving, NoiseModel
 from ..estimate.inputs import white_noise_std
 from ..log import Contradiction, Log
 from ..model import Model
@@ -71,7 +71,7 @@ def unrelated(driving: Driving, innovation: FloatArray, spread: FloatArray) -> d
     return {name: text for _, name, text in sorted(found, reverse=True)}
 
 
-def incoherent(driving: Driving, model: Model) -> dict[str, str]:
+def incoherent(driving: Driving, model: Model, noise: NoiseModel | None = None) -> dict[str, str]:
     """Find the channels that break the laws of motion: wrong unit, sign, order or time.
 
     Effects that move forces seem to explain such readings: a yaw rate that is late looks like a
@@ -82,13 +82,16 @@ def incoherent(driving: Driving, model: Model) -> dict[str, str]:
     driving : Driving
     model : Model
         What its effects do themselves, with the values that they have, is no contradiction.
+    noise : NoiseModel, optional
+        Beside the model: neither is what a road does whose slope varies, where it has one.
 
     Returns
     -------
     dict of str to str
         A sentence for each such channel.
     """
-    on_a_slope = any(e.breaks == "on a slope" for e in model.parts)
+    varies = noise is not None and noise.sloping
+    on_a_slope = varies or any(e.breaks == "on a slope" for e in model.parts)
     found: dict[str, str] = {}
     for log in driving.logs:
         for c in log.contradictions:

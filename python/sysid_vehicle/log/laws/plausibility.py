@@ -18,7 +18,7 @@ from ..._common.arrays import FloatArray
 from ...vehicle import GRAVITY_MPS2
 from ..channels import DEG
 from ..signals import least_speed_mps
-from .bank import leans_deg
+from .bank import leans_deg, wanders_deg
 from .clock import clock_notes
 from .lags import lag_notes
 from .laws import (
@@ -288,12 +288,14 @@ def _check_sliding(drive: Drive) -> list[Contradiction]:
     lost = found.coherence < 0.1 and ratio + 5.0 * deviation < 0.8 and ratio < 0.3
     clear = spread_of(expected - found.coefficients[1] * turn) > CLEARLY
     if lost and (clear or drive.motion.disorder["vy_mps"] > WHITE):
-        bank_deg = leans_deg(drive)
+        into_turns = leans_deg(drive)
+        where = "into its turns" if into_turns is not None else "to either side"
+        bank_deg = into_turns or wanders_deg(drive)
         if bank_deg is not None:
             text = (
-                f"vy_mps: changes as on a road that leans by up to {bank_deg:.2g} deg into its "
-                f"turns, {drive.place(expected)}; if it does not, check that the column holds the "
-                f"lateral speed, in the order of time"
+                f"vy_mps: changes as on a road that leans by up to {bank_deg:.2g} deg {where}, "
+                f"{drive.place(expected)}; if it does not, check that the column holds the lateral "
+                f"speed, in the order of time"
             )
             return [Contradiction("vy_mps", text, on_the_level=True)]
         raise Implausible(
