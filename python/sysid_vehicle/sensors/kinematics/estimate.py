@@ -40,6 +40,7 @@ _SETTLED = 0.03  # of a standard deviation
 # Second derivatives of speeds and yaw rate: so large that they matter only without readings.
 _ROUGH = {"vx": 300.0, "vy": 300.0, "yaw": 100.0}
 _ROAD_ROUNDS = 3  # the road is learned in every third round at least
+_BACK = 0.5  # of the last step
 _NEARLY = 0.3  # of a standard deviation: near enough to learn it
 
 
@@ -176,7 +177,7 @@ def estimate(
     x, colours = _begin(readings, grid, floors)
     uneven = {signal: Unevenness(grid.steps(signal)) for signal in SLOW}
     gains = OneSided(names)
-    settled, road = False, dict[str, float]()
+    settled, road, last = False, dict[str, float](), np.zeros(len(names))
     for count in range(1, _ROUNDS + 1):
         check_time()
         system = linearise(readings, grid, x, faults, colours, runs, calm=grid.smoothed(x))
@@ -188,7 +189,11 @@ def estimate(
         prior = np.diag(2.0 / (typical**2 + now**2) + most**-2.0)
         normal = normal_equations(system, rows, x, prior, now)
         std = np.sqrt(np.diag(np.linalg.inv(normal.information)))
-        step = _bounded(gains.step(normal, now), names, faults)
+        # The motion of the speeds alone is too rough to tell from its derivatives what faults do:
+        # all sensors settle it first.
+        settles = count == 1
+        wanted = np.zeros(now.size) if settles else gains.step(normal, now)
+        last = step = _bounded(_calmed(wanted, last, normal.information), names, faults)
         dx = normal.motion_step - normal.across @ step
         x = x + dx
         for name, change in zip(names, step, strict=True):
@@ -329,6 +334,12 @@ def _rows(
     steps = [grid.steps(signal) / road[signal] for signal in SLOW]
     bends = [grid.bends(signal) / _ROUGH[signal] for signal in QUICK]
     return scipy.sparse.vstack([_levels(readings, grid), *steps, *bends], format="csr")
+
+
+def _calmed(step: FloatArray, last: FloatArray, information: FloatArray) -> FloatArray:
+    """Half of a step that takes back most of the last one: the whole one goes to and fro."""
+    back = float(step @ information @ last) < -_BACK * float(last @ information @ last)
+    return 0.5 * step if back else step
 
 
 def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -> FloatArray:
