@@ -68,7 +68,8 @@ def check(
         Says how far the IMU can be from the speed sensor, and which faults harm a car of its size.
     level : bool
         Whether the ground is level, as a test track: a road that leans with its turns reads as a
-        scale of `ay_mps2`, or as gravity by roll, of which less is told by default.
+        scale of `ay_mps2`, or as gravity by roll, and one on which the car slows where it climbs as
+        a scale of `ax_mps2` or as a delay of the speeds. By default less is told of these.
     seed : int
         Of the draws that teach the noise.
 
@@ -210,13 +211,17 @@ def checked(
 
     faults = told_of(found)
     if not enough(found, faults):
-        claimed = {fault.name for fault in faults if fault.found}
+        # Wheels that slip look like hills as well.
+        claimed = {fault.name for fault in told_of(found, level=True) if fault.found}
         found, faults = explained(found, lacks)
         for kind in others:
             # A speed of wheels is only asked for where something is off: most cars have one.
             if kind <= {*SLIPS} and not claimed:
                 continue
             other = of_all(lacks - kind)
+            # On hills the speed of any car reads as that of wheels.
+            if kind <= {*SLIPS} and not level and other.hilly:
+                continue
             if preferred(misfit_of, other, found) > _LIKELIER and _may_be(other):
                 instead, left = explained(other, lacks - kind)
                 # Wheels that slip take the place of faults, and bring none.

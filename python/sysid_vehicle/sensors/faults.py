@@ -236,7 +236,7 @@ def faults_of(
     wheelbase_m : float, optional
         Of the car; by default an ordinary one.
     level : bool
-        Whether the road does not lean with its turns.
+        Whether the road neither leans with its turns nor climbs.
     """
     every = _TOLD if wheelbase_m is None else tuple(told.in_car(wheelbase_m) for told in _TOLD)
     rows = [t for t in every if t.of[-1] in found.faults]
@@ -275,8 +275,7 @@ class _Asked:
         found = self.found
         pick = np.array([1.0 if name in told.of else 0.0 for name in found.faults])
         value = _size(found, pick, found.covariance)[0]
-        leans = told.name == "gain_ay" and not self.level
-        road = found.leaning_with_turns if leans else 0.0
+        kind, road = ("", 0.0) if self.level else _road(found, told.name)
         std = math.hypot(self._std(told, pick), road)
         at_null = math.hypot(_size(found, pick, found.null_covariance)[1], road)
         widest = max(std, at_null)
@@ -295,7 +294,7 @@ class _Asked:
             another = self._one_of_two(told, rival, other)
             reason = why_not(told.name, other=other, there=bool(another))
         elif not (claimed or well) and 2.0 * road**2 > widest**2:
-            reason = why_not(told.name, other="road")
+            reason = why_not(told.name, other=kind)
         elif not (claimed or well):
             reason = _confounded(told, pick, found, self.naive, list(found.faults))
         return SensorFault(
@@ -327,6 +326,14 @@ class _Asked:
         others = [rival for without, rival in self.rivals.items() if {*told.of} <= {*without}]
         rival = min(others, key=lambda rival: rival.worse, default=None)
         return None if rival is None or rival.share < FALSE_CLAIMS else rival
+
+
+def _road(found: Estimate, name: str) -> tuple[str, float]:
+    """What a road that is not level does that acts like a fault, and how large that may be."""
+    if name == "gain_ay":
+        return "lean", found.leaning_with_turns
+    scale, late_s = found.slowing_on_climbs
+    return "climb", scale if name == "gain_ax" else late_s if name in _OF_THE_SPEEDS else 0.0
 
 
 def _size(found: Estimate, pick: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:

@@ -11,10 +11,9 @@ from .apply import corrected, retimed
 from .check import checked
 from .condition import conditioned
 from .faults import SensorFault, to_put_right
-from .kinematics.estimate import Estimate
+from .kinematics.estimate import LEVEL_MPS2, Estimate
 
 _DELAYS = ("delay_vx_s", "delay_vy_s", "delay_ay_s")
-_LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def made_ready(
         return own, rest, Kinematics()
     # A driver who steers, brakes and drives against a road that is not level makes speeds and
     # accelerations seem to come at other times.
-    if max(found.estimate.road_mps2.values()) > _LEVEL_MPS2:
+    if max(found.estimate.road_mps2.values()) > LEVEL_MPS2:
         return own, rest, Kinematics()
     left = tuple(fault for fault in found.faults if fault.name not in _DELAYS)
     late = to_put_right([found[name] for name in _DELAYS])

@@ -54,10 +54,14 @@ _OTHER = {
     "slip.braked": "slip of the wheels whose speed is logged",
     "lean.ax_mps2": "a body that pitches late",
     "lean.ay_mps2": "a body that rolls late",
-    "road": "a road that leans with its turns",
+    "lean": "a road that leans with its turns",
+    "climb": "a road on which the car slows where it climbs",
 }
 # What tells it, in place of other driving.
-_ELSEWHERE = {"road": "corners on level ground (`level=True`, `--level-ground`)"}
+_ELSEWHERE = {
+    "lean": "corners on level ground (`level=True`, `--level-ground`)",
+    "climb": "level ground (`level=True`, `--level-ground`), or firm braking and acceleration,",
+}
 ON_CORRECTION = (
     "delay of steer_rad: kinematics does not know the steering",
     "delay of ax_mps2 against yaw_rate_radps: the two meet in vy_mps * yaw_rate_radps alone",

@@ -30,6 +30,8 @@ from .one_sided import OneSided
 from .road import Unevenness
 from .system import Band, drawn, linearise, normal_equations, whitened_errors
 
+LEVEL_MPS2 = 0.05
+"""Change of gravity within a second on a road that counts as level."""
 _ROUNDS = 30
 _LEAST_ROUNDS = 8
 _DRAWS = 2
@@ -41,7 +43,7 @@ _SETTLED = 0.03  # of a standard deviation
 _ROUGH = {"vx": 300.0, "vy": 300.0, "yaw": 100.0}
 _ROAD_ROUNDS = 3  # the road is learned in every third round at least
 _BACK = 0.5  # of the last step
-_NEARLY = 0.3  # of a standard deviation: near enough to learn it
+_NEARLY = 0.3  # of a standard deviation: near enough to learn it, and at the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ class Estimate:
     rounds : int
         Rounds until nothing moved any more.
     settled : bool
-        Whether that was reached.
+        Whether that was reached, or nearly.
     factor : ndarray, shape (width, grid.size)
         Banded Cholesky factor of the motion's information, the faults held.
     across : ndarray, shape (grid.size, n)
@@ -110,6 +112,27 @@ class Estimate:
         vx, yaw, bank = (self.x[self.grid.index[name]] for name in ("vx", "yaw", "bank"))
         turning = float(np.std(vx * yaw))
         return float(np.std(bank)) / turning if turning > 0.0 else 0.0
+
+    @property
+    def hilly(self) -> bool:
+        """Whether the road climbs and falls by more than one that counts as level."""
+        return self.road_mps2["grade"] > LEVEL_MPS2
+
+    @property
+    def slowing_on_climbs(self) -> tuple[float, float]:
+        """The scale of a_x, and the delay of the speeds [s], that a driver makes up on hills.
+
+        A car slows where the road climbs and gains where it falls, sooner or later: so much of the
+        slope goes with the change of the speed, or with the change of that. How far the road
+        climbs tells how large either may be: where it brakes hard next to nothing, and nothing
+        where it counts as level.
+        """
+        if not self.hilly:
+            return 0.0, 0.0
+        grade = float(np.std(self.x[self.grid.index["grade"]]))
+        felt = (self.grid.changes(self.x, "vx", order) for order in (1, 2))
+        scale, late_s = (grade / float(np.std(a)) if np.any(a) else 0.0 for a in felt)
+        return scale, late_s
 
     def draw(
         self, count: int, seed: int | np.random.Generator = 0
@@ -216,6 +239,8 @@ def estimate(
                 slope.improve(x, normal.band)
                 if not slope.at_rest:
                     gains.forget()
+    # Noise and road may creep on, which moves no fault by anything that matters.
+    settled = settled or moved < _NEARLY
     # On a smooth motion delays are not told from places by what is noise. Faults that act alike
     # where there are none look told apart where the estimate has left zero: a delay at constant
     # speed is the place of the IMU, up to the square of the delay.

@@ -139,6 +139,18 @@ class Grid:
                 calm[at] = np.convolve(padded, _SMOOTH, mode="valid")
         return calm
 
+    def changes(self, x: FloatArray, signal: str, order: int) -> FloatArray:
+        """Changes of a speed or of the yaw rate within a second, or changes of these, and so on."""
+        second = max(1, round(1.0 / self.step_s))
+        found = []
+        for at in np.split(self.index[signal], np.cumsum(self._counts[0])[:-1]):
+            changed = x[at]
+            for _ in range(order):
+                changed = changed[second:] - changed[:-second]
+            found.append(changed)
+        together: FloatArray = np.concatenate(found)
+        return together
+
     def levels(self, told: Collection[int]) -> scipy.sparse.csr_matrix:
         """Rows, divided by their standard deviation; of v_y only in stretches that are not `told`.
 
