@@ -9,7 +9,7 @@ import sysid_vehicle as sv
 from sysid_vehicle.compare import incoherent
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.log.laws.plausibility import check_coherence
-from sysid_vehicle.manoeuvres import Manoeuvre
+from sysid_vehicle.manoeuvres import Knots, Manoeuvre
 
 MODEL = sv.Model(sv.example_vehicle())
 LEVEL = sv.NoiseModel(
@@ -60,3 +60,30 @@ def test_rows_in_disorder_are_refused_as_before() -> None:
     order = np.random.default_rng(1).permutation(table["vy_mps"].size)
     with pytest.raises(sv.InvalidInput, match="vy_mps: does not change as"):
         sv.Log.from_arrays({**table, "vy_mps": table["vy_mps"][order]})
+
+
+def town(seed: int) -> dict[str, np.ndarray]:
+    """Slow turns on roads that lean, by a driver who answers."""
+    rng = np.random.default_rng(seed)
+    at = np.arange(6.0, 145.0, 8.5)
+    speeds = Knots((0.0, *at), tuple(rng.uniform(6.0, 14.0, at.size + 1)), smooth=True)
+    turns = [
+        (t + s, a * on)
+        for t, a in zip(at, rng.choice([-1.0, 1.0], at.size) * rng.uniform(1.5, 4.5, at.size))
+        for s, on in ((0.0, 0.0), (1.2, 1.0), (3.5, 1.0), (4.7, 0.0))
+    ]
+    bends = Knots(*(tuple(column) for column in zip((0.0, 0.0), *turns)), smooth=True)
+    course = Manoeuvre("town", "slow turns", 150.0, speeds, bends, True)
+    log = sv.drive(
+        MODEL, course, seed=seed, disturbance=sv.RoadDisturbance(slope_rad=0.015), rate_hz=50.0
+    )
+    return {name: log[name] for name in log.channels}
+
+
+def lags(table: dict[str, np.ndarray]) -> dict[str, float]:
+    return {c.channel: c.late_s for c in check_coherence(table, 50.0) if c.late_s}
+
+
+@pytest.mark.parametrize("seed", [14, 15, 30, 36])
+def test_a_bank_that_the_driver_answers_is_no_lag(seed: int) -> None:
+    assert lags(town(seed)) == {}

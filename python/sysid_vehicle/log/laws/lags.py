@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -38,6 +39,8 @@ _MIN_GAIN = {
 }
 _MIN_GAIN_ELSE = 1.2
 _COHERENT = 0.5
+_MOMENT = 3  # windows, each half over the next
+_LASTS = 0.5  # of a lag, that changes within a moment show as well
 _SIDE = {"vy_mps": "vy", "yaw_rate_radps": "yaw", "ay_mps2": "ay"}
 _MIN_EVIDENCE = 30.0
 _EXCITED_MPS2 = 0.4
@@ -104,12 +107,39 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
         return [scale]
     if not _told(lags[name], usual, usual, _MIN_GAIN[name]):
         return []
+    lag = _in_changes(lags[name], sides, name, mean, spread, usable)
+    if lag is None:
+        return []
     others = {
         "vy_mps": "ay_mps2 and yaw_rate_radps",
         "yaw_rate_radps": "ay_mps2",
         "ay_mps2": "yaw_rate_radps",
     }
-    return [_note(name, others[name], lags[name])]
+    return [_note(name, others[name], lag)]
+
+
+def _in_changes(
+    lag: Lag,
+    sides: Callable[..., Sides],
+    name: str,
+    mean: FloatArray,
+    spread: FloatArray,
+    usable: np.ndarray,
+) -> Lag | None:
+    """The lag, or the surer one of what changes within a moment; None where that hardly lags.
+
+    A driver answers to a road that leans, so that its bank looks like a lag of what turns the car.
+    A bank hardly changes in a moment, and a clock that is late is late for quick changes, too.
+    """
+
+    def changes(lag_s: float) -> tuple[FloatArray, FloatArray]:
+        y, x = sides(**{_SIDE[name]: 1.0})(lag_s)
+        return y[_MOMENT:] - y[:-_MOMENT], x[_MOMENT:] - x[:-_MOMENT]
+
+    quick = find_lag(changes, mean, spread, usable[_MOMENT:] & usable[:-_MOMENT])
+    if quick.seconds / lag.seconds < _LASTS:
+        return None
+    return min(lag, quick, key=lambda found: found.deviation)
 
 
 def _scale(
