@@ -100,7 +100,7 @@ def axle_forces(
     for log in together:
         if not np.isfinite(log["steer_rad"]).any():
             raise InvalidInput(f"{log.name}: steer_rad holds no value; map the steering angle")
-        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
+        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m, lf_m=vehicle.lf_m)
     inertia = vehicle.yaw_inertia_kgm2 or vehicle.usual_inertia_kgm2
     places = Places.of(sensors)
     steer = places.values(sensors, "steer_rad")
