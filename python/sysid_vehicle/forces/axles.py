@@ -39,6 +39,7 @@ def axle_forces(
     vehicle: Vehicle,
     *,
     sensors: SensorCheck | None = None,
+    level: bool = False,
     cg_ahead_m: float = 0.0,
     count: int = 60,
     seed: int = 0,
@@ -58,6 +59,8 @@ def axle_forces(
         Without a yaw inertia m l_f l_r is taken.
     sensors : SensorCheck, optional
         Check of these logs, where there is one already.
+    level : bool
+        Whether the ground is level, for the check where there is none yet.
     cg_ahead_m : float
         How far the centre of gravity lies ahead of the place whose speeds the log holds [m].
     count : int
@@ -94,7 +97,7 @@ def axle_forces(
         raise InvalidInput(f"cg_ahead_m = {cg_ahead_m!r}: give metres")
     count = max(whole(count, "count"), 2)
     if sensors is None:
-        sensors = check(together, vehicle, seed=seed)
+        sensors = check(together, vehicle, level=level, seed=seed)
     elif sensors.logs != together:
         raise InvalidInput("axle_forces: sensors is a check of other logs; give that of these logs")
     for log in together:
