@@ -100,10 +100,12 @@ def axle_forces(
         sensors = check(together, vehicle, level=level, seed=seed)
     elif sensors.logs != together:
         raise InvalidInput("axle_forces: sensors is a check of other logs; give that of these logs")
+    # Who says where the sensors lie knows that they may lie far back.
+    lf_m = vehicle.lf_m if ahead == 0.0 else None
     for log in together:
         if not np.isfinite(log["steer_rad"]).any():
             raise InvalidInput(f"{log.name}: steer_rad holds no value; map the steering angle")
-        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m, lf_m=vehicle.lf_m)
+        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m, lf_m=lf_m)
     inertia = vehicle.yaw_inertia_kgm2 or vehicle.usual_inertia_kgm2
     places = Places.of(sensors)
     steer = places.values(sensors, "steer_rad")

@@ -82,3 +82,13 @@ def test_a_baseline_is_told_and_a_model_that_explains_it_is_not(rear_steered: sv
     assert fit["rear_steering.rear"].value == pytest.approx(14.0, rel=0.02)
     with pytest.warns(SysidWarning, match="looks steered at the rear axle"):
         sv.identify(sv.Model(CAR), log, starts=1)
+
+
+def test_axle_forces_with_a_place_that_is_told_do_not_doubt_it() -> None:
+    truth = sv.Model(CAR).add("ins_lever_arm").with_values({"ins_lever_arm.forward_m": -2.9})
+    log = sv.drive(truth, LAP, seed=930414)
+    with pytest.warns(SysidWarning, match=r"the sensors lie 2\.[789]|the sensors lie 3 m"):
+        sv.axle_forces(log, CAR, count=2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SysidWarning)
+        sv.axle_forces(log, CAR, cg_ahead_m=2.9, count=2)
