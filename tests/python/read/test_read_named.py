@@ -4,7 +4,40 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from log_formats import FACTORS, FAST, MAP, SLOW, UNITS, check_values, measured, read_told, table
+
+from sysid_vehicle.errors import SysidWarning
+from sysid_vehicle.read import read_log
+
+
+def test_a_factor_of_one_says_that_the_stated_unit_is_wrong(tmp_path: Path) -> None:
+    """It was converted all the same, and no factor but 1.0000001 could say otherwise."""
+    from asammdf import MDF, Signal
+
+    metres = {n: FACTORS.get(c, 1.0) * measured(FAST)[n] for c, n in MAP.items()}
+    units = UNITS | {"Speed": "km/h"}
+    signals = [
+        Signal(x, FAST, name=n, unit=units[n] if n == "Speed" else "") for n, x in metres.items()
+    ]
+    with MDF() as file:
+        file.append(signals)
+        file.save(tmp_path / "log.mf4", overwrite=True)
+    given = {**MAP, "vx_mps": {"column": "Speed", "factor": 1.0}}
+    log = read_log(tmp_path / "log.mf4", given, check=False)
+    np.testing.assert_allclose(log["vx_mps"], metres["Speed"])
+    (tmp_path / "map.toml").write_text(
+        "[channels]\n"
+        + "".join(f'{c} = "{n}"\n' for c, n in MAP.items() if c != "vx_mps")
+        + 'vx_mps = { column = "Speed", factor = 1.0 }\n'
+    )
+    log = read_log(tmp_path / "log.mf4", tmp_path / "map.toml", check=False)
+    np.testing.assert_allclose(log["vx_mps"], metres["Speed"])
+    for said in ({"offset": 0.0}, {"delay_s": 0.0}, {"factor": 1.0, "as_stated": True}):
+        given["vx_mps"] = {"column": "Speed", **said}
+        with pytest.warns(SysidWarning, match="the file states 'km/h'"):
+            log = read_log(tmp_path / "log.mf4", given, check=False)
+        np.testing.assert_allclose(log["vx_mps"], metres["Speed"] / 3.6)
 
 
 def sampled(name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -49,6 +82,4 @@ def test_an_attribute_names_the_columns_of_a_matrix(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "log.h5", "a") as file:
         del file["data"].attrs["units"]
     told = {c: {"column": name, "factor": FACTORS.get(c, 1.0)} for c, name in MAP.items()}
-    from sysid_vehicle.read import read_log
-
     check_values(read_log(tmp_path / "log.h5", told, check=False))
