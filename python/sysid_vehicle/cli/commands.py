@@ -165,6 +165,7 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
         test,
         most_effects=args.max_effects,
         exclude=args.exclude,
+        level=args.level_ground,
         time_limit_s=None if limit is None else _STUDIED * limit,
         matters=args.matters,
         tell=note,

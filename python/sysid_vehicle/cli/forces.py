@@ -7,7 +7,7 @@ import argparse
 from .._common.style import new_figure
 from ..forces import COLOURS, axle_forces
 from ..vehicle import Vehicle
-from .log_arguments import add_driving, read_logs
+from .log_arguments import add_driving, add_level, read_logs
 from .outputs import add_json, add_output, write_figures, write_picture
 
 
@@ -17,6 +17,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "forces", help="find axle forces over slip angles from the motion, before any tyre"
     )
     add_driving(parser)
+    add_level(parser, "as `check` takes it")
     parser.add_argument(
         "--cg-ahead",
         type=float,
@@ -35,7 +36,7 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Find the forces, print, draw, write."""
     vehicle = Vehicle.from_toml(args.vehicle)
     logs = read_logs(args.logs, args, vehicle)
-    found = axle_forces(logs, vehicle, cg_ahead_m=args.cg_ahead)
+    found = axle_forces(logs, vehicle, level=args.level_ground, cg_ahead_m=args.cg_ahead)
     print(found)
     write_figures(args.json, found.to_dict(), heard)
     if args.plot is not None:

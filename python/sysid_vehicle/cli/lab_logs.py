@@ -205,7 +205,7 @@ def _logs_of(args: argparse.Namespace, vehicle: Vehicle) -> list[Log]:
     """Logs of this car: with another mass or wheelbase a search is long, and finds nothing."""
     logs = read_logs(args.logs, args, vehicle)
     for log in () if args.unchecked else logs:
-        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
+        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m, lf_m=vehicle.lf_m)
     return logs
 
 

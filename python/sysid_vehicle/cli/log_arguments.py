@@ -39,6 +39,15 @@ def add_driving(parser: argparse.ArgumentParser) -> None:
     add_reading(parser)
 
 
+def add_level(parser: argparse.ArgumentParser, what: str) -> None:
+    """Ask whether the ground is level, with what that changes."""
+    parser.add_argument(
+        "--level-ground",
+        action="store_true",
+        help=f"the road does not lean with its turns, as on a test track: {what}",
+    )
+
+
 def names(text: str) -> tuple[str, ...]:
     """Return names that stand between commas."""
     return tuple(name for name in (part.strip() for part in text.split(",")) if name)

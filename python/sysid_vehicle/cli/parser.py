@@ -8,7 +8,7 @@ from pathlib import Path
 from .. import _core
 from ..demo import DEFAULT, RANDOM
 from . import changed, fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
-from .log_arguments import LOG_HELP, add_driving, add_effects, names
+from .log_arguments import LOG_HELP, add_driving, add_effects, add_level, names
 from .outputs import add_json, add_output
 
 _MARKDOWN = (".md",)  # in which a study may be reported too
@@ -126,6 +126,7 @@ def _search(parser: argparse.ArgumentParser) -> None:
         help="fit offsets that every measured log has (biases, turn of the speed sensor, steering "
         "offset, crossfall) without naming them",
     )
+    add_level(parser, "no slope of the road is considered")
     parser.add_argument(
         "--exclude",
         type=names,

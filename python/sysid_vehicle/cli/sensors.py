@@ -10,7 +10,7 @@ from ..errors import InvalidInput
 from ..report import check_page
 from ..sensors import check
 from ..vehicle import Vehicle
-from .log_arguments import LOG_HELP, add_reading, read_logs, written_map
+from .log_arguments import LOG_HELP, add_level, add_reading, read_logs, written_map
 from .outputs import add_json, add_output, write_figures
 
 
@@ -21,11 +21,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
     parser.add_argument("--vehicle", type=Path, metavar="TOML", help="the car's own numbers")
-    parser.add_argument(
-        "--level-ground",
-        action="store_true",
-        help="the road does not lean with its turns, as on a test track: more is told of ay_mps2",
-    )
+    add_level(parser, "more is told of ay_mps2")
     add_reading(parser)
     add_output(
         parser,

@@ -11,6 +11,7 @@ from ..errors import InvalidInput, warn
 from ..identify import Fit
 from ..model import Model
 from ..vehicle import AXLES, Vehicle
+from .equations import equations
 from .fmu import fmu_bytes
 from .languages import casadi_function, cpp_text, python_text
 from .tyres import left_out_of_tir, tir_text
@@ -44,7 +45,7 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
         files of MF 5.2, one for each axle, ``_front`` and ``_rear`` added to the name. ``.toml``: a
         vehicle file with the tyres and the yaw inertia of the model, and with the numbers that its
         effects changed, such as mass, centre of gravity or drag. Effects for which a file has no
-        place are named in a warning.
+        place are named in a warning, and so is what each log has of its own (`with_nuisances`).
 
     Returns
     -------
@@ -63,6 +64,7 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
     suffix = path.suffix.lower()
     if suffix == ".fmu":
         write_bytes(path, fmu_bytes(model))
+        _tell_offsets(model, path)
         return (path,)
     if suffix == ".tir":
         files = {path.with_stem(f"{path.stem}_{a}"): tir_text(model, a) for a in AXLES}
@@ -84,7 +86,21 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
         )
     for file, text in files.items():
         write_text(file, text)
+    if suffix != ".tir":
+        _tell_offsets(model, path)
     return tuple(files)
+
+
+def _tell_offsets(model: Model, path: Path) -> None:
+    """Warn of what was of the logs, and is now of the car: a bank, a zero of the steering."""
+    own = dict.fromkeys(name.split(".")[0] for name in model.offset_names)
+    there = [e for e in own if e not in equations(model).left_out]
+    if there:
+        names = ", ".join(f"'{e}'" for e in there)
+        warn(
+            f"{path}: {', '.join(there)}: what each log has of its own is in it, with the value of "
+            f"the fit; for a car that is driven elsewhere export model.drop({names})"
+        )
 
 
 def identified_vehicle(model: Model) -> Vehicle:

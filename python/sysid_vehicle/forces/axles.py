@@ -39,6 +39,7 @@ def axle_forces(
     vehicle: Vehicle,
     *,
     sensors: SensorCheck | None = None,
+    level: bool = False,
     cg_ahead_m: float = 0.0,
     count: int = 60,
     seed: int = 0,
@@ -58,6 +59,8 @@ def axle_forces(
         Without a yaw inertia m l_f l_r is taken.
     sensors : SensorCheck, optional
         Check of these logs, where there is one already.
+    level : bool
+        Whether the ground is level, for the check where there is none yet.
     cg_ahead_m : float
         How far the centre of gravity lies ahead of the place whose speeds the log holds [m].
     count : int
@@ -94,13 +97,15 @@ def axle_forces(
         raise InvalidInput(f"cg_ahead_m = {cg_ahead_m!r}: give metres")
     count = max(whole(count, "count"), 2)
     if sensors is None:
-        sensors = check(together, vehicle, seed=seed)
+        sensors = check(together, vehicle, level=level, seed=seed)
     elif sensors.logs != together:
         raise InvalidInput("axle_forces: sensors is a check of other logs; give that of these logs")
+    # Who says where the sensors lie knows that they may lie far back.
+    lf_m = vehicle.lf_m if ahead == 0.0 else None
     for log in together:
         if not np.isfinite(log["steer_rad"]).any():
             raise InvalidInput(f"{log.name}: steer_rad holds no value; map the steering angle")
-        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
+        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m, lf_m=lf_m)
     inertia = vehicle.yaw_inertia_kgm2 or vehicle.usual_inertia_kgm2
     places = Places.of(sensors)
     steer = places.values(sensors, "steer_rad")

@@ -43,6 +43,7 @@ from .suspects import explaining
 
 _STARTED = 0.3  # of the time that a search has, for its starts
 _OFFSETS = 2  # times that offsets of logs are found, and noise of other time scales is tried
+_OF_PLACES = ("ins_lever_arm", "imu_lever_arm", "speed_sensor_lever_arm")
 
 
 @typed
@@ -267,8 +268,12 @@ def _check(model: Model, driving: Driving) -> None:
             f"{few(again)} is given twice and counts twice: intervals come out too narrow; leave "
             "one of the two out"
         )
+    car = model.vehicle
+    # A model that knows where the sensors lie, or has forces of the user's, explains such a log.
+    known = any(e.acts or e.id in _OF_PLACES for e in model.parts)
+    lf_m = None if known else car.lf_m
     for log in driving.logs:
-        check_car(log, mass_kg=model.vehicle.mass_kg, wheelbase_m=model.vehicle.wheelbase_m)
+        check_car(log, mass_kg=car.mass_kg, wheelbase_m=car.wheelbase_m, lf_m=lf_m)
     check_excitation(list(driving.logs))
     _say_what_is_not_seen(model, driving)
 

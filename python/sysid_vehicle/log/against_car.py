@@ -19,6 +19,7 @@ from .laws.laws import CLEARLY, EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, f
 from .laws.longitudinal import DRAG_PER_M, ramp_on
 from .laws.motion import Motion
 from .laws.regression import size_of
+from .laws.steered_axle import steered_behind
 from .log import Log
 
 _MOVING = 5.0  # m/s, with a wheelbase of `_USUAL_M`: slip and curvature are alike at like v^2 / L
@@ -80,11 +81,12 @@ class _Told:
         return math.log(self.high / self.low) / (2.0 * _SURE)
 
 
-def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
+def check_car(log: Log, *, mass_kg: float, wheelbase_m: float, lf_m: float | None = None) -> None:
     """Refuse a log that is not one of this car: by its mass, by its wheelbase.
 
     Of a steering angle that is off by less than a steering ratio or a unit it is warned, as soon as
-    it surely is: a locked differential asks for up to twice the angle as well.
+    it surely is: a locked differential asks for up to twice the angle as well. So it is of a car
+    that steers its rear axle, where it is said how far ahead the front axle lies.
 
     Raises
     ------
@@ -123,6 +125,9 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
         if abs(math.log(steer.ratio)) > math.log(_STEER_NEVER):
             raise InvalidInput(said)
         warn(said)
+    behind = "" if lf_m is None else steered_behind(drive, lf_m, wheelbase_m - lf_m)
+    if behind:
+        warn(f"{log.name}: {behind}")
 
 
 def times_wheelbase(

@@ -270,7 +270,7 @@ def estimate_sideslip(
         If the car is too slow for the observer all the time, the tyres of the vehicle file do not
         fit the drive, or the dual observer has learnt far softer ones.
     """
-    check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
+    check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m, lf_m=vehicle.lf_m)
     settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
     run = run_over(log, SideslipObserver(vehicle, settings, kind), settings)
     if kind == "dual":

@@ -15,10 +15,10 @@ from .._common.typed import typed
 from ..errors import InvalidInput
 from ..export import identified_vehicle
 from ..identify import Fit
-from ..log import Log
+from ..log import Log, check_car
 from ..vehicle import Vehicle
-from .sideslip import estimate_sideslip
-from .sideslip_results import SideslipRun
+from .sideslip import SideslipObserver, run_over, static_stiffness, yaw_inertia
+from .sideslip_results import SideslipRun, doubted
 from .sideslip_settings import SideslipSettings
 
 #: What no data sheet tells: errors of the model, and how far two sensors are to be trusted.
@@ -111,13 +111,22 @@ def calibrate_sideslip(
     Raises
     ------
     InvalidInput
-        If the log has no measured sideslip, or nothing is to be learnt.
+        If the log has no measured sideslip, the car is too slow for the observer all the time, or
+        nothing is to be learnt.
+
+    Warns
+    -----
+    SysidWarning
+        As `estimate_sideslip` does, with the settings that were learnt.
     """
     if not log.has("vy_mps"):
         raise InvalidInput(f"{log.name}: vy_mps is not there; calibrate on a drive that has it")
     if runs < 1 or not learnt:
         raise InvalidInput("learnt, runs: give one setting and one run at least")
+    check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m, lf_m=vehicle.lf_m)
     start = settings if settings is not None else SideslipSettings.of(log, vehicle)
+    # What is warned of is warned of once: settings on trial say nothing of car or log.
+    car = vehicle.replace(yaw_inertia_kgm2=yaw_inertia(vehicle))
     names = list(learnt)
     rng = generator(seed)
 
@@ -125,9 +134,13 @@ def calibrate_sideslip(
 
     def tried(x: FloatArray) -> tuple[float, SideslipRun]:
         changed = dict(zip(names, (float(v) for v in np.exp(x)), strict=True))
-        run = estimate_sideslip(
-            vehicle, log, kind=kind, settings=start.replace(**changed), judge=False
-        )
+        trial = start.replace(**changed)
+        run = run_over(log, SideslipObserver(car, trial, kind), trial)
+        if run.too_slow:
+            raise InvalidInput(
+                f"{log.name}: no sideslip is estimated, as the car is too slow all the time; "
+                f"calibrate on a drive with hard cornering"
+            )
         far = 0.5 * float(np.sum((x - begin) ** 2)) / _SPREAD**2
         return _score(run) - far * _LASTS_S / max(log.duration_s, _LASTS_S), run
 
@@ -144,6 +157,8 @@ def calibrate_sideslip(
             steps[moved] *= _WIDEN
         else:
             steps[moved] *= _NARROW
+    if kind == "dual":
+        doubted(after, static_stiffness(vehicle))
     return SideslipCalibration(after.settings, before, after, score_before, score)
 
 

@@ -33,7 +33,7 @@ class Kinematics:
 
 
 def made_ready(
-    logs: Sequence[Log], others: Sequence[Log]
+    logs: Sequence[Log], others: Sequence[Log], *, level: bool = False
 ) -> tuple[list[Log], list[Log], Kinematics]:
     """Logs with white noise, whose channels were read at the same moment.
 
@@ -45,6 +45,8 @@ def made_ready(
     ----------
     logs, others : sequence of Log
         Of the same sensors; the first ones tell the delays.
+    level : bool
+        Whether the ground is level.
 
     Returns
     -------
@@ -55,7 +57,7 @@ def made_ready(
     ready = conditioned([*logs, *others])
     own, rest = ready[: len(logs)], ready[len(logs) :]
     try:
-        found = checked(own, enough=_nothing)
+        found = checked(own, enough=_nothing, level=level)
     except SysidError:
         return own, rest, Kinematics()
     # A driver who steers, brakes and drives against a road that is not level makes speeds and

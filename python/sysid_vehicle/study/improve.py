@@ -31,6 +31,8 @@ _CHANNELS = "whether all channels have the same clock, and white noise"
 _BASELINE = "the likeliest parameters of the baseline"
 _CLOCK = "the results with the delay of the wheel force corrected"
 
+_SLOPES = ("road_bank", "road_grade")  # effects that level ground has not
+
 
 @typed
 @explaining
@@ -45,6 +47,7 @@ def improve(
     candidates: Sequence[str] | None = None,
     exclude: Sequence[str] = (),
     sensors: SensorCheck | Literal[False] | None = None,
+    level: bool = False,
     time_limit_s: float | None = None,
     matters: Mapping[str, float | str] | None = None,
     starts: int = 8,
@@ -83,6 +86,9 @@ def improve(
         considered, and no effect is larger than kinematics leaves it. Without one only what the
         likelihood cannot hold is taken out: delays of one channel against another, low-passes of
         sensors, vibration, and another clock of the wheel force; with False not even that.
+    level : bool
+        Whether the ground is level, as a test track: slopes of the road are not considered, and
+        the readings are taken as `check` takes them there.
     time_limit_s : float, optional
         After so many seconds the study ends, wherever it is, but for some passes over the data:
         about as long as `compare` and one scoring of all effects take. The check of the sensors,
@@ -132,10 +138,12 @@ def improve(
     schedule = Schedule.of(began, wants.limit_s)
     judging = Judging(schedule.judging)
     forget()  # what is remembered of earlier studies: that of many would fill the memory
-    train, test, kinematics, checked = _ready(train, test, sensors, schedule.sensors)
+    train, test, kinematics, checked = _ready(
+        train, test, sensors, level=level, ends=schedule.sensors
+    )
     if not checked:
         judging.left_out.append(_CHANNELS)
-    left_out = {*wants.excluded, *kinematics.settles}
+    left_out = {*wants.excluded, *kinematics.settles, *(_SLOPES if level else ())}
     wanted = tuple(e for e in wants.wanted if e.id not in left_out)
     others = {*left_out, *(e.id for e in wanted)}
     finer = tuple(e for e in refining() if e.id not in others) if candidates is None else ()
@@ -214,6 +222,8 @@ def _ready(
     train: Log | Sequence[Log],
     test: Log | Sequence[Log] | None,
     sensors: SensorCheck | Literal[False] | None,
+    *,
+    level: bool,
     ends: float,
 ) -> tuple[Sequence[Log], Log | Sequence[Log] | None, Kinematics, bool]:
     """The logs with what their sensors do wrong taken out, and what is known of the sensors.
@@ -226,7 +236,7 @@ def _ready(
     if sensors is not None:
         own, rest = ([sensors.apply(log) for log in some] for some in (logs, others))
         return own, None if test is None else rest, Kinematics(sensors.settles), True
-    ready = before(ends, lambda: made_ready(logs, others), None)
+    ready = before(ends, lambda: made_ready(logs, others, level=level), None)
     if ready is None:
         return logs, test, Kinematics(), False
     own, rest, kinematics = ready

@@ -67,12 +67,13 @@ def town(seed: int) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(seed)
     at = np.arange(6.0, 145.0, 8.5)
     speeds = Knots((0.0, *at), tuple(rng.uniform(6.0, 14.0, at.size + 1)), smooth=True)
+    sizes = rng.choice([-1.0, 1.0], at.size) * rng.uniform(1.5, 4.5, at.size)
     turns = [
         (t + s, a * on)
-        for t, a in zip(at, rng.choice([-1.0, 1.0], at.size) * rng.uniform(1.5, 4.5, at.size))
+        for t, a in zip(at, sizes, strict=True)
         for s, on in ((0.0, 0.0), (1.2, 1.0), (3.5, 1.0), (4.7, 0.0))
     ]
-    bends = Knots(*(tuple(column) for column in zip((0.0, 0.0), *turns)), smooth=True)
+    bends = Knots(*(tuple(column) for column in zip((0.0, 0.0), *turns, strict=True)), smooth=True)
     course = Manoeuvre("town", "slow turns", 150.0, speeds, bends, True)
     log = sv.drive(
         MODEL, course, seed=seed, disturbance=sv.RoadDisturbance(slope_rad=0.015), rate_hz=50.0

@@ -1,13 +1,14 @@
 """What a calibration drive teaches the sideslip observers, and what vibration must not do."""
 
 import dataclasses
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.online import (
     calibrate_sideslip,
     estimate_sideslip,
@@ -120,3 +121,30 @@ def test_a_fit_gives_its_car(vehicle):
     assert car.tyre_rear.D == 1.25
     assert car.yaw_inertia_kgm2 == vehicle.yaw_inertia_kgm2
     assert car.tyre_front.C == vehicle.tyre_front.C
+
+
+def test_settings_on_trial_warn_of_nothing(vehicle, log):
+    """Of tyres that are softer than told it was warned once for every run, with other figures."""
+    stiff = {"B": 3.0 * vehicle.tyre_front.B}
+    told = dataclasses.replace(
+        vehicle,
+        tyre_front=vehicle.tyre_front.replace(**stiff),
+        tyre_rear=vehicle.tyre_rear.replace(**stiff),
+        yaw_inertia_kgm2=None,
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SysidWarning)
+        calibrate_sideslip(told, log.between(0.0, 15.0), runs=5)
+    said = [str(w.message) for w in caught]
+    assert sum("yaw_inertia_kgm2 is not given" in text for text in said) == 1
+    assert sum("cornering stiffness" in text for text in said) == 1
+
+
+def test_a_drive_that_is_too_slow_teaches_nothing(vehicle, log):
+    columns = {name: log[name] for name in log.channels} | {"vx_mps": 0.01 * log["vx_mps"]}
+    slow = sv.Log.from_arrays(columns, name="slow", check=False)
+    with (
+        pytest.warns(SysidWarning, match="no sideslip was estimated"),
+        pytest.raises(InvalidInput, match="slow: no sideslip is estimated"),
+    ):
+        calibrate_sideslip(vehicle, slow)

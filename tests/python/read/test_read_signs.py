@@ -97,3 +97,43 @@ def test_a_size_without_its_sign_is_refused_with_the_remedy(
     columns = sent | {"steer_rad": right["steer_rad"]}
     with pytest.raises(InvalidInput, match=r"yaw_rate_radps: is never negative.*sign = "):
         sv.read_log(columns, {"yaw_rate_radps": {"column": "ESP_Gierrate", "factor": DEG}})
+
+
+def test_a_sign_that_is_called_after_the_device_is_proposed(
+    right: sv.Log, sent: dict[str, np.ndarray]
+) -> None:
+    """Without it a steering angle that is never negative was read, with another gear."""
+    names = {"LWI_Lenkradwinkel": "SAS1.SAS_Angle", "LWI_VZ_Lenkradwinkel": "SAS1.SAS_Sign"}
+    sent = {names.get(name, name): values for name, values in sent.items()}
+    found = sv.propose_channels(sent, vehicle=sv.example_vehicle())
+    assert found.channels["steer_rad"].sign == "SAS1.SAS_Sign"
+    # Of two signals of that device nothing says which one it belongs to.
+    both = sent | {"SAS1.SAS_Torque": np.abs(right["yaw_rate_radps"])}
+    assert sv.propose_channels(both).channels["steer_rad"].sign == ""
+
+
+@pytest.mark.parametrize("channel", ["steer_rad", "yaw_rate_radps", "ay_mps2"])
+def test_a_size_is_refused_on_a_road_that_turns_one_way_more(channel: str) -> None:
+    """Where two thirds of the turns are to the left a size follows the others well enough."""
+    t = np.arange(0.0, 120.0, 0.02)
+    rng = np.random.default_rng(930511)
+    curvature = np.interp(t, np.arange(0.0, 121.0, 4.0), rng.normal(0.015, 0.02, 31))
+    speed = 12.0 + 3.0 * np.sin(0.2 * t)
+    columns = {
+        "time_s": t,
+        "vx_mps": speed + 0.02 * rng.standard_normal(t.size),
+        "yaw_rate_radps": curvature * speed + 0.002 * rng.standard_normal(t.size),
+        "ax_mps2": 0.6 * np.cos(0.2 * t) + 0.05 * rng.standard_normal(t.size),
+        "ay_mps2": curvature * speed**2 + 0.05 * rng.standard_normal(t.size),
+        "steer_rad": curvature * (2.6 + 0.002 * speed**2) + 1e-4 * rng.standard_normal(t.size),
+    }
+    sv.read_log(columns)
+    with pytest.raises(InvalidInput, match=rf"{channel}: is never negative.*sign = "):
+        sv.read_log(columns | {channel: np.abs(columns[channel])})
+
+
+@pytest.mark.parametrize("name", ["acc_lon", "acc_lon_g"])
+def test_a_short_name_of_the_longitudinal_acceleration_is_known(name: str, right: sv.Log) -> None:
+    columns = {n: np.array(right[n]) for n in right.channels if n not in ("ax_mps2", "fx_n")}
+    columns[name] = right["ax_mps2"] / 9.80665
+    assert sv.propose_channels(columns).channels["ax_mps2"].column == name

@@ -52,12 +52,12 @@ from .over_ground import check_over_ground
 from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
 from .rear_axle import check_rear_axle
 from .regression import in_most, size_of
+from .sizes import check_sizes
 from .swapped_speeds import check_swapped_speeds
 from .wheelbase import check_steering, gripping, is_model_car
 
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
 _ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
-_ONE_WAY = 0.02  # of the largest reading: a channel that hardly goes below zero
 _HOLDS = 0.2  # of what it demands: a law that holds this closely needs no regression
 
 # Lever arms and roll bend the lateral speed more than the accelerations.
@@ -178,6 +178,7 @@ def _check_laws(drive: Drive, model_car: bool) -> tuple[list[Contradiction], lis
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
         raise wrong_sign("vx_mps", "is negative for most of the drive", speed, drive)
+    check_sizes(drive)
     _check_lateral(drive)
     clock = clock_notes(drive.motion)
     doubtful = [] if clock else check_steering(drive)
@@ -247,15 +248,6 @@ def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
     odd = min(answers, key=lambda name: answers[name])
     other = "vx_mps * yaw_rate_radps" if odd == "ay_mps2" else "ay_mps2 / vx_mps"
     driver = turn if odd == "ay_mps2" else ay
-    size = drive.mean(c[odd])
-    one_way = float(size.min()) > -_ONE_WAY * float(size.max())
-    if one_way and cosine(size, np.abs(driver)) > 0.8:
-        raise Implausible(
-            odd,
-            f"{odd}: is never negative, though its size follows {other}, {drive.place(driver)}: "
-            f"where a bus sends size and sign apart, name the column of the sign in the channel "
-            f"map, sign = 'its name'",
-        )
     raise Implausible(
         odd,
         f"{odd}: does not follow {other}, as it must in every corner, {drive.place(driver)}; check "

@@ -1,7 +1,8 @@
 """HDF5, netCDF 4 and MATLAB 7.3 files, by h5py: numeric data sets in groups of any depth.
 
 What is packed by the conventions of netCDF (``scale_factor``, ``add_offset``, ``_FillValue``) is
-unpacked. The fields of a compound data set, such as a table of PyTables, are arrays beside it.
+unpacked. The fields of a compound data set, such as a table of PyTables, are arrays beside it; so
+are the columns of a matrix with a list of their names as an attribute (``columns``, ``names``).
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ _MATLAB_NUMBERS = (
     "logical",
     *(f"{s}int{b}" for s in ("", "u") for b in (8, 16, 32, 64)),
 )
+_UNITS = ("units", "unit", "Unit")
+_NAMES = ("columns", "column_names", "names", "labels", "channels", "fields")
 _MATLAB_OBJECTS = ("timetable", "table", "timeseries", "datetime", "duration")
 
 
@@ -42,10 +45,13 @@ def read(path: Path, dbc: Path | None) -> Table | Recording:
             hidden.append(name)
         if (kind and kind not in _MATLAB_NUMBERS) or "MATLAB_empty" in node.attrs:
             return  # text and cells
-        unit = next(
-            (_text(node.attrs[k]) for k in ("units", "unit", "Unit") if k in node.attrs), ""
-        )
+        unit = next((_text(node.attrs[k]) for k in _UNITS if k in node.attrs), "")
         parts = tuple(name.split("/"))
+        if names := _columns(node):
+            units = _texts(node.attrs, _UNITS) or [unit] * len(names)
+            for column, name, own in zip(next(_arrays(node))[1].T, names, units, strict=False):
+                leaves.append(Leaf((*parts, name), column, own))
+            return
         for inner, values in _arrays(node):
             values = values.T if kind else values  # MATLAB stores columns first
             leaves.append(Leaf((*parts, *inner), np.squeeze(values), unit))
@@ -59,6 +65,22 @@ def read(path: Path, dbc: Path | None) -> Table | Recording:
             f"s.vx = x.vx; save('log.mat', '-struct', 's')"
         )
     return contents_of(leaves, str(path))
+
+
+def _columns(node: Any) -> list[str]:
+    """Names of the columns of a matrix, where its attributes hold as many; else none."""
+    names = _texts(node.attrs, _NAMES)
+    fits = node.ndim == 2 and node.dtype.kind in "biuf" and len(names) == node.shape[1]
+    return names if fits and len({*names}) == len(names) else []
+
+
+def _texts(attributes: Any, called: tuple[str, ...]) -> list[str]:
+    """The first attribute of these that is a list of texts."""
+    for name in called:
+        value = np.asarray(attributes.get(name, ""))
+        if value.ndim == 1 and value.dtype.kind in "OSU":
+            return [_text(text).strip() for text in value]
+    return []
 
 
 def _arrays(node: Any) -> Iterator[tuple[tuple[str, ...], npt.NDArray[Any]]]:

@@ -1,11 +1,13 @@
 """MATLAB files up to version 7, by SciPy.
 
 Read are arrays, in structs of any depth; Simulink's structures with time; what dSPACE records
-(``X.Data``, ``Y.Name``, ``Y.Data``, ``Y.Unit``); structs of a time and a value.
+(``X.Data``, ``Y.Name``, ``Y.Data``, ``Y.Unit``); structs of a time and a value, with a unit beside;
+arrays of structs that hold their names.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,9 @@ import numpy as np
 from ...errors import InvalidInput
 from ..recording import Recording
 from ..table import Table
-from .tree import Leaf, contents_of
+from .tree import VALUES, Leaf, contents_of
+
+_NAME, _UNIT = ("name", "label"), ("unit", "units")
 
 
 def read(path: Path, dbc: Path | None) -> Table | Recording:
@@ -48,13 +52,22 @@ def _walk(value: Any, path: tuple[str, ...], leaves: list[Leaf]) -> None:
         fields = {name: getattr(value, name) for name in value._fieldnames}
         if _recorded(fields, path, leaves):
             return
+        begun = len(leaves)
         _walk_all(fields, path, leaves)
+        unit = _named(fields, _UNIT)
+        for k in range(begun, len(leaves) if unit else begun):
+            *around, last = leaves[k].path
+            if tuple(around) == path and last.lower() in VALUES:
+                leaves[k] = replace(leaves[k], unit=unit)
     elif isinstance(value, np.ndarray):
         if value.dtype.kind in "biuf":
             leaves.append(Leaf(path, value))
         elif value.dtype.kind == "O":
+            names = [_named(getattr(s, "__dict__", {}), _NAME) for s in value.flat]
+            told = len({*names} - {""}) == value.size
             for k, inner in enumerate(value.flat, 1):
-                _walk(inner, (*path[:-1], f"{path[-1]}({k})"), leaves)
+                own = (*path, names[k - 1]) if told else (*path[:-1], f"{path[-1]}({k})")
+                _walk(inner, own, leaves)
 
 
 def _walk_all(fields: dict[str, Any], path: tuple[str, ...], leaves: list[Leaf]) -> None:
@@ -99,6 +112,11 @@ def _recorded(fields: dict[str, Any], path: tuple[str, ...], leaves: list[Leaf])
             leaves.append(Leaf((*path, name), np.asarray(signal.Data), unit, time))
         return True
     return False
+
+
+def _named(fields: dict[str, Any], called: tuple[str, ...]) -> str:
+    """The text in a struct that is called so."""
+    return next((_text(x) for name, x in fields.items() if name.lower() in called), "")
 
 
 def _text(value: Any) -> str:

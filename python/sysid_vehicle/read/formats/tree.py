@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 _TIMES = ("time_s", "time", "t", "times", "timestamp", "timestamps", "seconds", "tout")
 _TIME_OF = re.compile(r"(?:t|time)_(.+)|(.+)_(?:t|time)", re.I)  # of one channel
-_VALUES = ("data", "values", "value", "signal")
+VALUES = ("data", "values", "value", "signal")
 _MOST_COLUMNS = 64  # of a matrix that are channels
 
 
@@ -72,7 +72,7 @@ def _recording(columns: list[Leaf], times: Mapping[tuple[str, ...], Leaf]) -> Re
     found: dict[tuple[str, ...], tuple[Leaf, npt.NDArray[np.float64] | None]] = {}
     for leaf in columns:
         path = leaf.path
-        if path[-1].lower() in _VALUES and len(path) > 1 and path[:-1] not in found:
+        if path[-1].lower() in VALUES and len(path) > 1 and path[:-1] not in found:
             path = path[:-1]
         found[path] = leaf, leaf.time_s if leaf.time_s is not None else _time_of(leaf, times)
     named = _short(found)

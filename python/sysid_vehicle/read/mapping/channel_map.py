@@ -68,8 +68,9 @@ class ChannelMap:
         Each entry is the name of the source column, a table with ``column``, ``mean_with`` (a list
         of others, whose mean with it is taken), ``factor`` (1),
         ``offset`` (0), ``despike`` (false), ``delay_s`` (0), ``sign`` (the column that is 1 where
-        the value is negative) and, for ``vy_mps``, ``sideslip`` (false), or ``false`` to ignore
-        the channel;
+        the value is negative), ``as_stated`` (whether a unit that the file states is converted:
+        true where there is no factor, and false where there is one, 1 too) and, for ``vy_mps``,
+        ``sideslip`` (false), or ``false`` to ignore the channel;
         ``time_s = { rate_hz = 100 }`` numbers the rows of a file without time. ``[ground]`` has
         ``heading`` and ``east`` and ``north``, or ``speed`` and ``course``, in the same form, and
         for angles ``from``, which is ``"north"`` (clockwise) or ``"east"`` (anticlockwise).
@@ -159,8 +160,8 @@ class ChannelMap:
     def apply(self, table: Table, notes: list[str]) -> dict[str, FloatArray]:
         """Return the canonical channels of `table`, then its other numeric columns.
 
-        Where the map gives neither factor nor offset, a unit that the file states is converted,
-        which `notes` tells.
+        Where the map gives neither a factor nor an offset but 0, a unit that the file states is
+        converted, which `notes` tells.
 
         Raises
         ------

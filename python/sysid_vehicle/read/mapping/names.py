@@ -56,7 +56,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"inline acc\w*|laengs ?beschl\w*|langsversnelling|\blon(g|gi)?acc?\b",
         r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
         r"^(imu|ins|body) a ?x$",
-        r"\bacc\w* (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
+        r"\bacc\w* (body|hor) x$|acc\w* forward$|^lon acc\w*$|\bacc lon$|^a ?(lon|long|laengs)$",
         r"\bspecific force (x|long\w*)$",
     ),
     "ay_mps2": (
@@ -237,14 +237,30 @@ def is_sideslip(name: str) -> bool:
 def sign_of(name: str, others: Iterable[str]) -> str:
     """Return the column that holds the sign of another, by its name; empty if there is none.
 
-    ``ESP_VZ_Gierrate`` is that of ``ESP_Gierrate``, ``YawRate_Sign`` that of ``YawRate``.
+    ``ESP_VZ_Gierrate`` is that of ``ESP_Gierrate``, ``YawRate_Sign`` that of ``YawRate``. So is
+    ``SAS_Sign`` that of ``SAS_Angle``, where nothing else of the message begins with ``SAS``.
     """
+    others = list(others)
     own = Counter(words(name).split())
     for other in others:
         there = Counter(words(other).split())
         if {*there} & _SIGN and Counter({w: k for w, k in there.items() if w not in _SIGN}) == own:
             return other
+    message, mine = _apart(name)
+    within = [(other, {*part}) for other in others for of, part in [_apart(other)] if of == message]
+    for other, part in within:
+        device = part - _SIGN
+        if not device or device == part or not device < {*mine}:
+            continue
+        if [n for n, p in within if device < p and not p & _SIGN] == [name]:
+            return other
     return ""
+
+
+def _apart(name: str) -> tuple[str, list[str]]:
+    """The message or group of a column, and the words of what stands behind it."""
+    of, _, last = name.replace("/", ".").rpartition(".")
+    return of, words(last).split()
 
 
 def is_speed(name: str) -> bool:

@@ -43,6 +43,7 @@ class Proposed:
             sign=self.sign,
             mean_with=self.mean_with,
             despike=self.despike,
+            as_stated=False,
         )
 
 

@@ -16,7 +16,10 @@ from ...log import CHANNELS, MEASURED, held_rows, interpolated, listed
 from ..table import Table
 from ..units import WHAT, factor_to, measures, states_nothing
 
-_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s", "sideslip", "sign", "mean_with")
+_SOURCE_KEYS = (
+    *("column", "factor", "offset", "despike", "delay_s", "sideslip", "sign", "mean_with"),
+    "as_stated",
+)
 _GROUND = ("east", "north", "speed", "course", "heading")  # speeds and angles are measured too
 Between = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
@@ -29,7 +32,9 @@ class Source:
     `sideslip`, for `vy_mps` alone: the column is the sideslip angle, which `factor` makes radians;
     the lateral speed is ``vx_mps tan(angle)``. `sign`: another column that is not 0 where the
     value is negative, for buses that send size and sign apart. `mean_with`: columns of which the
-    mean with `column` is taken, such as the speeds of both wheels of an axle.
+    mean with `column` is taken, such as the speeds of both wheels of an axle. `as_stated`: a unit
+    that the file states is converted, as neither factor nor offset is given; a factor of 1 that is
+    given says that the file is wrong.
     """
 
     column: str
@@ -40,6 +45,11 @@ class Source:
     sideslip: bool = False
     sign: str = ""
     mean_with: tuple[str, ...] = ()
+    as_stated: bool = True
+
+    def __post_init__(self) -> None:
+        if (self.factor, self.offset) != (1.0, 0.0):
+            object.__setattr__(self, "as_stated", False)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -53,8 +63,8 @@ class Source:
     def read(self, table: Table, channel: str, si_unit: str, notes: list[str]) -> FloatArray:
         """Return the values in SI units, shape (n,), as the rows of the file have them.
 
-        Where the map gives neither factor nor offset, a unit that the file states is converted,
-        which `notes` tells.
+        Where the map gives neither a factor nor an offset but 0, a unit that the file states is
+        converted, which `notes` tells.
 
         Raises
         ------
@@ -71,7 +81,7 @@ class Source:
         own: list[FloatArray] = []
         for name in (self.column, *self.mean_with):
             factor = 1.0
-            if (self.factor, self.offset) == (1.0, 0.0):
+            if self.as_stated:
                 factor = stated_factor(table, name, channel, si_unit, [] if own else notes)
             own.append(factor * values_of(table, name, channel))
         values = as_float64(np.mean(own, axis=0))
@@ -205,7 +215,8 @@ def source_of(entry: Mapping[str, Any], channel: str, where: str) -> Source:
     sign = entry.get("sign", "")
     if not isinstance(sign, str):
         raise InvalidInput(f"{where}: sign = {sign!r}; give the name of the column with the sign")
-    return Source(column, factor, offset, despike, delay_s, sideslip, sign, tuple(others))
+    stated = _flag(entry, "as_stated", where) if "as_stated" in entry else "factor" not in entry
+    return Source(column, factor, offset, despike, delay_s, sideslip, sign, tuple(others), stated)
 
 
 def _flag(entry: Mapping[str, Any], key: str, where: str) -> bool:

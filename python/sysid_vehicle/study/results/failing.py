@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...diagnose import INPUTS, Delay, Evidence, coherence
 from ...identify import refine
+from .sentences import on_train
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -42,6 +43,9 @@ def late(study: Study) -> dict[str, Delay]:
 def where_lines(study: Study) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Where the baseline and the final model fail: a title and sentences of each."""
     final = study.where.lines
+    if not study.omnibus.rejects:
+        # Where something is left all the same, the test alone would say that nothing is.
+        final = (on_train(study).removesuffix("."), *final[1:])
     lags = ", ".join(e.id for e in study.model.parts if e.scored_at_typical)
     final += tuple(
         d.answers(f"the model without {lags}", f"the {INPUTS[name]}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 _SHOWN = 4
 _ASKED = 2  # effects that a next drive is to show
+_RATIO = "steer_ratio.ratio_error"
+_PLACES = ("ins_lever_arm.forward_m", "imu_lever_arm.forward_m")
 _MEND = (
     "first correct the channels that contradict each other: `sysid-vehicle check` finds delays, "
     "scales and positions of sensors"
@@ -37,12 +40,41 @@ def next_steps(study: Study) -> tuple[str, ...]:
         return (
             (f"where that matters to you, {_drive_alike(study)}",) if only_elsewhere(study) else ()
         )
-    found = [*_of_names(study)]
+    found = [*_of_rear_wheels(study), *_of_names(study)]
     if study.verdict in LACKING:
         found += _of_what_is_left(study)
     if study.verdict == "not_testable":
         found.append("record corners, steps and sweeps of the steering, and study them")
     return tuple(found)
+
+
+def _of_rear_wheels(study: Study) -> list[str]:
+    """Ask whether the rear wheels steer where a steering ratio and a place together say so.
+
+    Rear wheels at a share of the angle of the front ones leave the difference to turn the car, and
+    move the point that follows the path ahead: by the wheelbase, times the share over the rest.
+    """
+    told = {e.name: e for e in study.estimates}
+    place = next((p for p in _PLACES if p in told), "")
+    if not place or _RATIO not in told:
+        return []
+    ratio, ahead, sure = told[_RATIO], told[place], study.rules.sure
+    share = -ratio.value
+    slope = study.fit.model.vehicle.wheelbase_m / (1.0 - share)
+    expected, std = slope * share, slope / (1.0 - share) * ratio.std
+    if abs(share) < sure * ratio.std or abs(ahead.value) < sure * ahead.std:
+        return []
+    if not abs(ahead.value - expected) < sure * math.hypot(ahead.std, std):
+        return []
+    place = place.split(".")[0]
+    way = "the same way" if share > 0.0 else "the other way"
+    by = f"{100.0 * abs(share):.2g} % of the angle of the front ones, {way}"
+    text = (
+        f"find out whether the rear wheels steer: steer_ratio and {place} together do what rear "
+        f"wheels do that steer by {by} (forward_m would be {expected:.2g} m then); "
+        f"docs/howto/own_effect.md has effects that steer them"
+    )
+    return [text]
 
 
 def open_groups(study: Study) -> tuple[tuple[str, ...], ...]:

@@ -138,7 +138,7 @@ def intervals(study: Study) -> str:
 
 
 def _left(study: Study) -> str:
-    left = _on_train(study)
+    left = on_train(study)
     if study.structure is not None and structured(study):
         left += f" A function of the driving still predicts {study.structure.strongest}."
     said = " ".join([*_explained(study), f"Final model: {left}", *_on_all(study)])
@@ -211,7 +211,8 @@ def structured(study: Study) -> bool:
     )
 
 
-def _on_train(study: Study) -> str:
+def on_train(study: Study) -> str:
+    """What the training data say of what the final model leaves."""
     test = study.omnibus
     if test.rejects and disturbance(study):
         return (
