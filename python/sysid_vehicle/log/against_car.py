@@ -94,9 +94,16 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float, lf_m: float | Non
         The message names key and channel, what the log tells, and the likely remedy.
     """
     columns = {name: log[name] for name in log.channels if name not in log.extras}
-    drive = _driven(columns, log.rate_hz, wheelbase_m)
-    if drive is None:
-        return
+    motion = _motion(columns, log.rate_hz)
+    drive = _driven(motion, wheelbase_m)
+    if drive is not None:
+        _check_numbers(log, drive, mass_kg, wheelbase_m)
+    behind = "" if lf_m is None else steered_behind(motion, lf_m, wheelbase_m - lf_m)
+    if behind:
+        warn(f"{log.name}: {behind}")
+
+
+def _check_numbers(log: Log, drive: Drive, mass_kg: float, wheelbase_m: float) -> None:
     if log.has("fx_n"):
         _refuse_without_brakes(log, drive, mass_kg)
     mass = _mass(drive, mass_kg) if log.has("fx_n") else None
@@ -125,9 +132,6 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float, lf_m: float | Non
         if abs(math.log(steer.ratio)) > math.log(_STEER_NEVER):
             raise InvalidInput(said)
         warn(said)
-    behind = "" if lf_m is None else steered_behind(drive, lf_m, wheelbase_m - lf_m)
-    if behind:
-        warn(f"{log.name}: {behind}")
 
 
 def times_wheelbase(
@@ -146,14 +150,18 @@ def times_wheelbase(
         Rate of the grid.
     wheelbase_m : float
     """
-    drive = _driven(columns, rate_hz, wheelbase_m)
+    drive = _driven(_motion(columns, rate_hz), wheelbase_m)
     told = None if drive is None else _steer(drive, wheelbase_m)
     return None if told is None else (told.ratio, math.exp(told.deviation))
 
 
-def _driven(columns: Mapping[str, FloatArray], rate_hz: float, wheelbase_m: float) -> Drive | None:
+def _motion(columns: Mapping[str, FloatArray], rate_hz: float) -> Motion:
     motion = Motion(columns, rate_hz)
     motion.windows(WINDOW_S)
+    return motion
+
+
+def _driven(motion: Motion, wheelbase_m: float) -> Drive | None:
     moving = _MOVING * math.sqrt(min(wheelbase_m / _USUAL_M, 1.0))
     rows = motion.usable & (motion.mean(motion.channels["vx_mps"]) > moving)
     return Drive(motion, rows) if np.count_nonzero(rows) >= _MIN_WINDOWS else None

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .laws import LINEAR_MPS2, Drive, fit, ones
+from .motion import Motion
 from .regression import SURE, Regression, size_of
 
 _SLOW_MPS = 1.5  # below, the lateral speed over the speed is noise
@@ -26,7 +27,7 @@ _CLOSELY = 0.25  # coherence
 _EXCITED_MPS2 = 0.1  # of what the accelerometer reads beside the turning of the path
 _COMPLIANCE, _COMPLIANCE_STD = 0.008, 0.006  # rad per m/s2, of the tyres of an axle
 _SCALE_STD, _BIAS_MPS2 = 0.1, 0.5  # of the accelerometer, gravity by roll and slopes included
-_LEAST_STD_M = 0.1  # of the distance: delays and roll bend it
+_LEAST_STD = 0.04  # of the distance, over the wheelbase: delays and roll bend it
 
 
 class Ahead(NamedTuple):
@@ -37,12 +38,11 @@ class Ahead(NamedTuple):
     high: float
 
 
-def path_ahead(drive: Drive) -> Ahead | None:
+def path_ahead(motion: Motion, wheelbase_m: float) -> Ahead | None:
     """How far ahead of the sensors of lateral motion the car follows its path.
 
     Of two sensors the one counts that is least behind it. None where the drive does not tell.
     """
-    motion = drive.motion
     c = motion.channels
     # What steers its rear axle is slow, and a point that follows the path does so at any speed.
     gentle = np.abs(motion.mean(c["ay_mps2"])) < LINEAR_MPS2
@@ -54,18 +54,19 @@ def path_ahead(drive: Drive) -> Ahead | None:
         told.append(_by_speed(drive))
     if any(law is None or law.coherence < _CLOSELY for law in told):
         return None
-    return min(_ahead(law) for law in told if law is not None)
+    least_std = _LEAST_STD * wheelbase_m
+    return min(_ahead(law, least_std) for law in told if law is not None)
 
 
-def steered_behind(drive: Drive, lf_m: float, lr_m: float) -> str:
+def steered_behind(motion: Motion, lf_m: float, lr_m: float) -> str:
     """What is said of a car that follows its path about where its front axle is; empty elsewhere.
 
     That axle does not steer then, or the sensors lie behind the rear axle, which reads the same.
     """
-    ahead = path_ahead(drive)
+    ahead = path_ahead(motion, lf_m + lr_m)
     if ahead is None or ahead.low < 0.5 * lf_m:
         return ""
-    sensors = "ay_mps2 and vy_mps" if "vy_mps" in drive.motion.channels else "ay_mps2"
+    sensors = "ay_mps2 and vy_mps" if "vy_mps" in motion.channels else "ay_mps2"
     return (
         f"looks steered at the rear axle: in gentle turns the car follows its path "
         f"{ahead.metres:.2g} m ({ahead.low:.2g} to {ahead.high:.2g}) ahead of the place of "
@@ -97,7 +98,7 @@ def _by_speed(drive: Drive) -> Regression:
     return fit(side, columns, [np.inf] * 4)
 
 
-def _ahead(law: Regression) -> Ahead:
+def _ahead(law: Regression, least_std: float) -> Ahead:
     metres = -float(law.coefficients[0])
-    reach = SURE * math.hypot(float(law.deviations[0]), _LEAST_STD_M)
+    reach = SURE * math.hypot(float(law.deviations[0]), least_std)
     return Ahead(metres, metres - reach, metres + reach)
