@@ -14,6 +14,7 @@ from .regression import size_of
 
 _ONE_WAY = 0.02  # of the size of the readings: a channel that hardly goes below zero
 _BOTH_WAYS = 0.1  # of what moves a channel: the least that is against it
+_AS_LARGE = 0.5  # of what moves it, where that is against it
 _CLOSELY = 0.8  # correlation of a size with that of what moves it
 
 
@@ -57,7 +58,12 @@ def _is_size_of(values: FloatArray, driver: FloatArray) -> bool:
     size, driving = size_of(values), size_of(driver)
     if float(values.min()) < -_ONE_WAY * size or not size > 0.0:
         return False
-    if size_of(np.minimum(driver, 0.0)) < _BOTH_WAYS * driving:
+    against = driver < -_BOTH_WAYS * driving
+    if size_of(np.minimum(driver, 0.0)) < _BOTH_WAYS * driving or not np.any(against):
+        return False
+    # On a road that leans acceleration and steering are against it where the car goes straight.
+    there = float(np.median(values[against])) / size
+    if there < _AS_LARGE * float(np.median(-driver[against])) / driving:
         return False
     # Single windows, as those in which the speed is lost, decide nothing.
     values, driver = np.clip(values, 0.0, size), np.clip(driver, -driving, driving)
