@@ -31,7 +31,7 @@ from .search.search import Box
 
 _SAMPLES = 20_000  # that tell what is between noise and parameters; of more it is a share
 _STEP, _BEND = 0.05, 0.3  # standard errors: for a change of scores, for the bend of the likelihood
-_BEFOREHAND = 0.2  # of what is known of a combination: with more its valley is not straight
+_BEFOREHAND = 0.1  # of what is known of a combination: with more its valley is not straight
 _STRAIGHT = 0.5  # of the same, of what the likelihood tells by its own bend: with less, as well
 _LEAST = 0.1  # of what is known of a combination that is left beside the noise: rounding counts
 _LITTLE = 0.01  # of the same, which changes half a percent of a standard error
