@@ -31,7 +31,8 @@ from .search.search import Box
 
 _SAMPLES = 20_000  # that tell what is between noise and parameters; of more it is a share
 _STEP, _BEND = 0.05, 0.3  # standard errors: for a change of scores, for the bend of the likelihood
-_BEFOREHAND = 0.01  # of what is known of a combination: with more its valley is not straight
+_BEFOREHAND = 0.1  # of what is known of a combination: with more its valley is not straight
+_STRAIGHT = 0.5  # of the same, of what the likelihood tells by its own bend: with less, as well
 _LEAST = 0.1  # of what is known of a combination that is left beside the noise: rounding counts
 _LITTLE = 0.01  # of the same, which changes half a percent of a standard error
 _KNOWN = 3.0  # standard errors of its logarithm: the score of noise that hardly shows is not linear
@@ -50,25 +51,28 @@ def beside_noise(fit: Fit) -> Fit:
     """
     box, p, noise = free_box(fit.model), fit.model.vector(), fit.noise.vector()
     x = p[box.columns]
+    unit, looked = box.units(x), _looked(box, x)
     told = np.array([np.isfinite(e.std) for e in fit.estimates])
     few = fit.driving.problem(fit.model, most_samples=_SAMPLES)
     objective = objective_of(fit.model, few, fit.driving)
     if not told.any():
         return fit
-    axes = _axes(fit.by_noise, _beforehand(objective, p, box), box.units(x), told)
-    if not axes.size:
-        return fit
     scale = fit.driving.samples / few.samples
     try:
+        axes = _axes(fit.by_noise, looked + _priors(objective, p, box), unit, told)
+        if not axes.size:
+            return fit
+        p = _with_room(p, box, axes)
         shares, turn = np.linalg.eigh(scale * _taken(objective, p, noise, box, axes))
         axes, shares = axes @ turn[:, shares > _LITTLE], shares[shares > _LITTLE]
         if not shares.size:
             return fit
         bend = scale * _bend(objective, p, noise, box, axes)
-        known, turn = np.linalg.eigh(bend - np.diag(shares))
+        boxed = axes.T @ (looked * np.outer(unit, unit)) @ axes
+        known, turn = _beside(bend + boxed, shares)
     except (NumericalError, np.linalg.LinAlgError):
         return fit
-    ways = box.units(x)[:, None] * (axes @ turn)
+    ways = unit[:, None] * (axes @ turn)
     more = 1.0 / np.clip(known, _LEAST, 1.0) - 1.0
     covariance = as_float64(fit.covariance + (ways * more) @ ways.T)
     wider = np.sqrt(np.diag(covariance))
@@ -76,13 +80,30 @@ def beside_noise(fit: Fit) -> Fit:
     return replace(fit, estimates=estimates, covariance=covariance)
 
 
+def _beside(bend: FloatArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What is known of combinations beside the noise, and the combinations, a column for each.
+
+    Where the likelihood bends by far less than frozen gains tell the valley is not straight, and
+    the score of the noise is that of other parameters.
+    """
+    told, turn = np.linalg.eigh(bend)
+    turn = turn[:, told > _STRAIGHT]
+    known, along = np.linalg.eigh(turn.T @ (bend - np.diag(shares)) @ turn)
+    return as_float64(known), as_float64(turn @ along)
+
+
 def _as_sure(estimate: Estimate, std: float) -> Estimate:
     return replace(estimate, std=std) if np.isfinite(estimate.std) else estimate
 
 
-def _beforehand(objective: Objective, p: FloatArray, box: Box) -> FloatArray:
-    """Information about the parameters by box and priors, of which the noise takes nothing."""
-    known = np.diag(1.0 / spread_of(box, p[box.columns]) ** 2)
+def _looked(box: Box, x: FloatArray) -> FloatArray:
+    """Information about the parameters by the box, of which the noise takes nothing."""
+    return as_float64(np.diag(1.0 / spread_of(box, x) ** 2))
+
+
+def _priors(objective: Objective, p: FloatArray, box: Box) -> FloatArray:
+    """The same by priors, which the likelihood of an objective counts."""
+    known = np.zeros((len(box.columns),) * 2)
     for rows in objective.prior:
         slopes = rows(p)[1][:, box.columns]
         known += slopes.T @ slopes
@@ -98,7 +119,7 @@ def _axes(
     that of other parameters. What a bound holds stays where it is.
     """
     unit, some = unit[told], np.ix_(told, told)
-    own = covariance[some] / np.outer(unit, unit)
+    own = _held(covariance, told) / np.outer(unit, unit)
     std = np.sqrt(np.diag(own))
     values, vectors = np.linalg.eigh(own / np.outer(std, std))
     root = std[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
@@ -106,6 +127,26 @@ def _axes(
     axes = np.zeros((len(told), int(np.count_nonzero(before < _BEFOREHAND))))
     axes[told] = root @ turn[:, before < _BEFOREHAND]
     return as_float64(axes)
+
+
+def _held(covariance: FloatArray, told: npt.NDArray[np.bool_]) -> FloatArray:
+    """The covariance of what is told where all else stays, as it does along an axis."""
+    free, held = np.flatnonzero(told), np.flatnonzero(~told)
+    std = np.sqrt(np.diag(covariance))
+    scaled = covariance / np.outer(std, std)
+    across = scaled[np.ix_(free, held)]
+    known = scaled[np.ix_(held, held)]
+    own = scaled[np.ix_(free, free)] - across @ np.linalg.solve(known, across.T)
+    return as_float64(own * np.outer(std[free], std[free]))
+
+
+def _with_room(p: FloatArray, box: Box, axes: FloatArray) -> FloatArray:
+    """The parameters, moved off bounds by what is stepped there: no step is to end at one."""
+    x = p[box.columns]
+    low, high = box.room(x)
+    reach = _BEND * np.sqrt(2.0) * np.linalg.norm(axes, axis=1)
+    reach = np.minimum(reach, 0.5 * (high - low))
+    return box.put(p, box.moved(x, np.maximum(low + reach, 0.0) + np.minimum(high - reach, 0.0)))
 
 
 def _taken(

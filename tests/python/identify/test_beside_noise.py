@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
+from sysid_vehicle.estimate import learn_noise
 from sysid_vehicle.identify import Fit, beside_noise, refine, refit
 
 LENGTH = "tyre_relaxation.relaxation_length_m"
+SHARE = "wheel_inertia.mass_share"
+PUSHES = sv.RoadDisturbance(fx_n=150.0, fy_n=200.0, mz_nm=100.0, correlation_time_s=0.3)
 
 
 def model() -> sv.Model:
@@ -28,7 +31,7 @@ def fitted(road: sv.RoadDisturbance | None) -> Fit:
 @pytest.fixture(scope="module")
 def pushed() -> Fit:
     """Forces of the road change as fast as the tyres answer."""
-    return fitted(sv.RoadDisturbance(fx_n=150.0, fy_n=200.0, mz_nm=100.0, correlation_time_s=0.3))
+    return fitted(PUSHES)
 
 
 def lost_at(fit: Fit, length_m: float) -> float:
@@ -66,3 +69,45 @@ def test_without_disturbances_noise_takes_next_to_nothing() -> None:
     held = refit(fit.model, fit.driving, fit.noise)
     for wide, narrow in zip(fit.estimates, held.estimates, strict=True):
         assert narrow.std <= wide.std < 1.02 * narrow.std
+
+
+def test_what_only_unknown_forces_tell_is_not_known() -> None:
+    """At constant speed turning wheels are as heavy as forces that nobody knows are large."""
+    known = [f"{letter}_{axle}" for letter in "BCDE" for axle in ("front", "rear")]
+    car = sv.Model(sv.example_vehicle()).add("wheel_inertia").with_fixed(known)
+    log = sv.drive(
+        car.with_values({SHARE: 0.3}),
+        sv.manoeuvres.sine_sweep(25.0, 25.0, 3.5),
+        seed=7401,
+        rate_hz=50.0,
+        disturbance=PUSHES,
+    )
+    fit = sv.identify(car, log, starts=1, progress=False)
+    held = refit(fit.model, fit.driving, fit.noise)[SHARE].std
+
+    def learned_at(share: float) -> float:
+        there = fit.model.with_values({SHARE: share})
+        problem = fit.driving.problem(there)
+        return learn_noise(problem, there.vector(), fit.noise, there.vehicle)[1]
+
+    ends = [fit[SHARE].value + sign * held for sign in (-1.0, 1.0)]
+    bend = 2.0 * learned_at(fit[SHARE].value) - sum(map(learned_at, ends))
+    assert bend < 0.3  # 1 where the standard error is right
+    assert fit[SHARE].std > 1.8 * held
+
+
+def test_what_a_bound_holds_widens_nothing_else() -> None:
+    """Coefficients that copy one at its bound are known beside it, and so is their product."""
+    car = sv.Model(sv.example_vehicle()).add("tyre_relaxation")
+    log = sv.drive(
+        car.with_values({LENGTH: 0.45}),
+        sv.manoeuvres.lap(40.0),
+        seed=6115,
+        rate_hz=50.0,
+        disturbance=PUSHES,
+    )
+    fit = sv.identify(car, log, starts=1, progress=False, bounds={"C_front": (1.5, 2.5)})
+    held = refit(fit.model, fit.driving, fit.noise)
+    assert np.isinf(fit["C_front"].std)
+    for name in ("cornering stiffness front", "cornering stiffness rear"):
+        assert held[name].std <= fit[name].std < 1.2 * held[name].std
