@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from ..._common.arrays import FloatArray
 from .laws import SPEED_UNITS, UNNAMED, Contradiction
 from .motion import Motion
-from .regression import SURE, Lag, Sides, find_lag, regress
+from .regression import SURE, Lag, Sides, find_lag, in_changes, regress
 from .steering import several_frequencies, steering_lag
 
 _MIN_RATE_HZ = 18.0
@@ -39,8 +38,6 @@ _MIN_GAIN = {
 }
 _MIN_GAIN_ELSE = 1.2
 _COHERENT = 0.5
-_MOMENT = 3  # windows, each half over the next
-_LASTS = 0.5  # of a lag, that changes within a moment show as well
 _SIDE = {"vy_mps": "vy", "yaw_rate_radps": "yaw", "ay_mps2": "ay"}
 _MIN_EVIDENCE = 30.0
 _EXCITED_MPS2 = 0.4
@@ -107,7 +104,7 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
         return [scale]
     if not _told(lags[name], usual, usual, _MIN_GAIN[name]):
         return []
-    lag = _in_changes(lags[name], sides, name, mean, spread, usable)
+    lag = in_changes(lags[name], sides(**{_SIDE[name]: 1.0}), mean, spread, usable)
     if lag is None:
         return []
     others = {
@@ -116,30 +113,6 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
         "ay_mps2": "yaw_rate_radps",
     }
     return [_note(name, others[name], lag)]
-
-
-def _in_changes(
-    lag: Lag,
-    sides: Callable[..., Sides],
-    name: str,
-    mean: FloatArray,
-    spread: FloatArray,
-    usable: np.ndarray,
-) -> Lag | None:
-    """The lag, or the surer one of what changes within a moment; None where that hardly lags.
-
-    A driver answers to a road that leans, so that its bank looks like a lag of what turns the car.
-    A bank hardly changes in a moment, and a clock that is late is late for quick changes, too.
-    """
-
-    def changes(lag_s: float) -> tuple[FloatArray, FloatArray]:
-        y, x = sides(**{_SIDE[name]: 1.0})(lag_s)
-        return y[_MOMENT:] - y[:-_MOMENT], x[_MOMENT:] - x[:-_MOMENT]
-
-    quick = find_lag(changes, mean, spread, usable[_MOMENT:] & usable[:-_MOMENT])
-    if quick.seconds / lag.seconds < _LASTS:
-        return None
-    return min(lag, quick, key=lambda found: found.deviation)
 
 
 def _scale(
@@ -254,8 +227,9 @@ def _steer(motion: Motion, usable: np.ndarray) -> list[Contradiction]:
     least = _MIN_GAIN["steer_rad"]
     lag = steering_lag(motion, usable, lambda found: _enough(found, least))
     # A car may answer late, and then its steering angle seems early; no car answers ahead of it.
-    told = _told(lag, _STEER_LATE_S, _STEER_EARLY_S, least)
-    return [_note("steer_rad", "yaw_rate_radps and ay_mps2", lag)] if told else []
+    if lag is None or not _told(lag, _STEER_LATE_S, _STEER_EARLY_S, least):
+        return []
+    return [_note("steer_rad", "yaw_rate_radps and ay_mps2", lag)]
 
 
 def _told(lag: Lag, late_s: float, early_s: float, least: float = _MIN_GAIN_ELSE) -> bool:

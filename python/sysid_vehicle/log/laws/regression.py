@@ -20,6 +20,8 @@ _REACH_S = 0.28
 _COARSE_S = 0.04
 SURE = 3.0  # deviations of what is sure
 _ROUNDS = 6  # of two-stage least squares, whose coefficients begin at those of the other
+_MOMENT = 3  # windows, each half over the next
+_LASTS = 0.5  # of a lag, that changes within a moment show as well
 _TINY = 1e-12
 
 Sides = Callable[[float], tuple[FloatArray, FloatArray]]
@@ -175,6 +177,33 @@ def find_lag(
     if abs(other[0] - lag) <= SURE * lost:
         return found
     return replace(found, seconds=other[0], deviation=other[1])
+
+
+def in_changes(
+    lag: Lag,
+    sides: Sides,
+    mean: FloatArray,
+    spread: FloatArray,
+    usable: np.ndarray,
+    instruments: FloatArray | None = None,
+) -> Lag | None:
+    """Return a lag, or the surer one of what changes within a moment; None if that hardly lags.
+
+    A driver answers to a road that leans, so that its bank looks like a lag of what turns the car.
+    A bank hardly changes in a moment, and a clock that is late is late for quick changes, too.
+    Arguments are those of :func:`find_lag`, whose rows are windows in their order.
+    """
+
+    def changes(lag_s: float) -> tuple[FloatArray, FloatArray]:
+        y, x = sides(lag_s)
+        return y[_MOMENT:] - y[:-_MOMENT], x[_MOMENT:] - x[:-_MOMENT]
+
+    moved = None if instruments is None else instruments[_MOMENT:] - instruments[:-_MOMENT]
+    both = usable[_MOMENT:] & usable[:-_MOMENT]
+    quick = find_lag(changes, mean, spread, both, moved)
+    if quick.seconds / lag.seconds < _LASTS:
+        return None
+    return min(lag, quick, key=lambda found: found.deviation)
 
 
 def _two_stage(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray
 from .motion import Motion
-from .regression import Lag, coarse_lags, find_lag, fitted
+from .regression import Lag, coarse_lags, find_lag, fitted, in_changes
 
 _LEAST_MPS = 3.0  # below, slip angles mean nothing
 _FRONT_M = 1.25  # from centre of gravity to front axle; corrected by a coefficient
@@ -49,8 +49,8 @@ def several_frequencies(m: Motion) -> bool:
     return float(share @ (f - mean) ** 2) / whole > (_NARROW * mean) ** 2
 
 
-def steering_lag(m: Motion, usable: np.ndarray, enough: Callable[[Lag], bool]) -> Lag:
-    """Return the lag of `steer_rad` behind the force of the front axle.
+def steering_lag(m: Motion, usable: np.ndarray, enough: Callable[[Lag], bool]) -> Lag | None:
+    """Return the lag of `steer_rad` behind the force of the front axle; None if it does not last.
 
     Parameters
     ----------
@@ -106,7 +106,9 @@ def steering_lag(m: Motion, usable: np.ndarray, enough: Callable[[Lag], bool]) -
 
     mean = np.concatenate([_CURVE_PRIOR, np.zeros(4)])
     spread = np.concatenate([_CURVE_SPREAD, _ERROR_SPREAD])
-    return find_lag(sides, mean, spread, usable, _steered(m, pull), enough)
+    moved = _steered(m, pull)
+    lag = find_lag(sides, mean, spread, usable, moved, enough)
+    return in_changes(lag, sides, mean, spread, usable, moved) if enough(lag) else lag
 
 
 def _steered(m: Motion, pull: FloatArray) -> FloatArray:
