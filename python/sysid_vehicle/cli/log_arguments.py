@@ -44,7 +44,7 @@ def add_level(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument(
         "--level-ground",
         action="store_true",
-        help=f"the road does not lean with its turns, as on a test track: {what}",
+        help=f"the road neither climbs nor leans with its turns, as on a test track: {what}",
     )
 
 

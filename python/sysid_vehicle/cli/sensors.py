@@ -21,7 +21,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
     parser.add_argument("--vehicle", type=Path, metavar="TOML", help="the car's own numbers")
-    add_level(parser, "more is told of ay_mps2")
+    add_level(parser, "more is told of accelerometers and delays")
     add_reading(parser)
     add_output(
         parser,
