@@ -6,6 +6,7 @@ namespace {
 
 constexpr double kSharingTime_s = 0.1;
 constexpr double kBlindBraking_mps2 = 5.0;  // how fast a speed may change that is not measured
+constexpr double kBlindSteering_s = 0.1;    // for how long an angle that is not read errs alike
 
 }  // namespace
 
@@ -68,7 +69,11 @@ void SideslipModel::observe(const Input& u, const S* x, S* y) const {
 Mat<3, 3> SideslipModel::process_noise(const Input& u) const {
     const double beta = settings.beta_walk_radps, rate = u.yaw_rate_std;
     const double fx = settings.fx_walk * car.data.mass_kg * kGravity;
-    return Vec<3>(u.dt * beta * beta + u.dt * u.dt * rate * rate, u.dt * fx * fx, u.dt * fx * fx)
+    const Axles<double> rest = static_loads(kGravity, car.data.lf_m, car.data.lr_m);  // per mass
+    const double by_steer = car.front.slope() * rest.front / u.vx * u.steer_std;
+    const double lasting = 2.0 * kBlindSteering_s * u.dt;
+    return Vec<3>(u.dt * beta * beta + u.dt * u.dt * rate * rate + lasting * by_steer * by_steer,
+                  u.dt * fx * fx, u.dt * fx * fx)
         .asDiagonal();
 }
 
@@ -127,7 +132,7 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
     });
     const bool again = lost();
     if (again) start(s);
-    report(s);
+    report(sample);
     if (again || watch_.refused()) out_.mode = ObserverMode::kCoasting;
     return out_;
 }
@@ -204,7 +209,8 @@ void SideslipUkf<method>::report(const SensorSample& s) {
     out_.nis = filter_.nis();
     out_.observed = now.update.observed;
     out_.log_likelihood = LogDensity::of(now.update);
-    const bool whole = now.update.observed == 2 && rate_gap_s_ == 0.0 && !std::isnan(s.vx_mps);
+    const bool whole =
+        now.update.observed == 2 && rate_gap_s_ == 0.0 && !std::isnan(s.steer_rad + s.vx_mps);
     out_.mode = whole ? ObserverMode::kRunning : ObserverMode::kCoasting;
 }
 
