@@ -117,6 +117,31 @@ def test_a_speed_that_no_name_tells_is_warned_of() -> None:
     assert not found(inputs, read, exact, input_std=0.0, start_std=0.0).contradictions
 
 
+def stateless(mass: float, inertia: float) -> Any:
+    own = twin(mass, inertia)
+    own.capabilities = frozenset({"parameters", "clone", "snapshot"})
+    return own
+
+
+def test_beside_a_speed_that_nothing_sets_what_bends_show_is_not_believed() -> None:
+    """Its mass was up to 14 standard errors away by both accelerations, with no word."""
+    inputs, read = driven(SEEDS[3])
+    mass = [Unknown("mass_kg", 250.0, 10.0, 700.0, 3000.0)]
+
+    def run(*channels: str) -> Observation:
+        noise = {name: COMPARED[name] for name in channels}
+        observer = Observer(batch=SideBySide(mass, noise, input_std=0.0))
+        return observe_with(stateless(1500.0, INERTIA_KGM2), inputs, read, observer)
+
+    along = run("ax_mps2")
+    assert not along.contradictions
+    assert abs(away(along)) < 3.0
+    for other in ("ay_mps2", "yaw_rate_radps"):
+        with pytest.warns(SysidWarning, match=rf"{other}: the twin's speed cannot be set.* alone"):
+            bent = run("ax_mps2", other)
+        assert abs(away(bent)) < 1.0
+
+
 def test_a_force_told_wrong_is_held_by_the_spread() -> None:
     inputs, read = driven(SEEDS[1])
     told = inputs * [1.04, 1.0]
