@@ -84,7 +84,7 @@ Mat<2, 2> SideslipModel::measurement_noise(const Input& u) const {
     const double by_rate = (c_f * car.data.lf_m - c_r * car.data.lr_m) / u.vx * u.yaw_rate_std;
     const double by_steer = c_f * u.steer_std;
     const double ay = settings.ay_mps2, model = settings.model_ay_mps2;
-    return Vec<2>(settings.ax_mps2 * settings.ax_mps2,
+    return Vec<2>(u.ax_std * u.ax_std,
                   ay * ay + model * model + by_rate * by_rate + by_steer * by_steer)
         .asDiagonal();
 }
@@ -109,6 +109,7 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
         return out_;
     }
     rate_gap_s_ = std::isnan(s.yaw_rate_radps) ? rate_gap_s_ + dt : 0.0;
+    const bool speed_before = speed_gap_s_ == 0.0;
     speed_gap_s_ = std::isnan(s.vx_mps) ? speed_gap_s_ + dt : 0.0;
     const bool fresh = !started_ || dt > kForgottenAfterS;
     if (fresh) start(s);
@@ -120,6 +121,11 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
         now.yaw_rate_radps =
             std::isnan(s.ay_mps2) ? input_.yaw_rate : s.ay_mps2 / now.vx_mps;  // a steady corner
     const SideslipModel::Input before = input_;
+    input_.ax_std = settings_.ax_mps2;
+    if (std::isnan(s.ax_mps2) && speed_before && speed_gap_s_ == 0.0 && !fresh) {
+        now.ax_mps2 = slowing(dt, now);
+        input_.ax_std = std::hypot(input_.ax_std, std::sqrt(2.0) * settings_.vx_mps / dt);
+    }
     in_short_steps(fresh ? std::min(dt, kLongestStepS) : dt, [&](double part, double share) {
         SensorSample at = now;
         if (share < 1.0) {
@@ -135,6 +141,14 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
     report(sample);
     if (again || watch_.refused()) out_.mode = ObserverMode::kCoasting;
     return out_;
+}
+
+/// What an accelerometer along the car would read by the speeds. Without any reading the wheel
+/// force walks to where it takes all grip.
+template <Method method>
+double SideslipUkf<method>::slowing(double dt, const SensorSample& now) const {
+    const double across = now.vx_mps * std::tan(filter_.state().mean[0]);
+    return (now.vx_mps - input_.vx) / dt - across * now.yaw_rate_radps;
 }
 
 template <Method method>
@@ -209,8 +223,8 @@ void SideslipUkf<method>::report(const SensorSample& s) {
     out_.nis = filter_.nis();
     out_.observed = now.update.observed;
     out_.log_likelihood = LogDensity::of(now.update);
-    const bool whole =
-        now.update.observed == 2 && rate_gap_s_ == 0.0 && !std::isnan(s.steer_rad + s.vx_mps);
+    const bool whole = now.update.observed == 2 && rate_gap_s_ == 0.0 &&
+                       !std::isnan(s.steer_rad + s.vx_mps + s.ax_mps2);
     out_.mode = whole ? ObserverMode::kRunning : ObserverMode::kCoasting;
 }
 
