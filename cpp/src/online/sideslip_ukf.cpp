@@ -103,7 +103,7 @@ template <Method method>
 const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample& sample) {
     const SensorSample s = watch_.look(dt, sample, index_);
     ++index_;
-    if (!watch_.fast_enough(s.vx_mps)) {
+    if (!watch_.fast_enough(std::isnan(s.vx_mps) && started_ ? input_.vx : s.vx_mps)) {
         started_ = false;
         out_ = rolling_without_slip(car_.data.lf_m, car_.data.lr_m, s);
         return out_;
@@ -115,7 +115,7 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
     if (fresh) start(s);
     // What is known at the ends of a long step is taken to change evenly between them.
     SensorSample now = s;
-    if (speed_gap_s_ > 0.0) now.vx_mps = input_.vx;
+    if (speed_gap_s_ > 0.0) now.vx_mps = fresh ? input_.vx : blind_speed(dt, s);
     now.vx_mps = std::max(now.vx_mps, kSlowestMps);
     if (rate_gap_s_ > 0.0)
         now.yaw_rate_radps =
@@ -141,6 +141,14 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
     report(sample);
     if (again || watch_.refused()) out_.mode = ObserverMode::kCoasting;
     return out_;
+}
+
+/// The speed where it is not read, by the accelerometer or, without it, by the wheel force.
+template <Method method>
+double SideslipUkf<method>::blind_speed(double dt, const SensorSample& s) const {
+    const Vec<3>& x = filter_.state().mean;
+    const double ax = std::isnan(s.ax_mps2) ? (x[1] + x[2]) / car_.data.mass_kg : s.ax_mps2;
+    return input_.vx + dt * (ax + input_.vx * std::tan(x[0]) * input_.yaw_rate);
 }
 
 /// What an accelerometer along the car would read by the speeds. Without any reading the wheel

@@ -176,6 +176,22 @@ def test_without_its_accelerometer_speeds_tell_the_wheel_force(vehicle, kind):
     assert (found[:, MODE] == 2).all()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_speed_that_is_not_read_goes_on_by_the_acceleration(vehicle, kind):
+    """Kinds with fixed tyres held the last one while the car braked."""
+    drive = sv.drive(sv.Model(vehicle), sv.manoeuvres.lap(60.0), seed=950206)
+    readings = np.column_stack([drive[name] for name in SENSORS])
+    speed, span = drive["vx_mps"], round(2.0 * drive.rate_hz)
+    first = int(np.argmax(np.abs(speed[span:] - speed[:-span])))
+    gap = slice(first, first + span)
+    assert np.ptp(speed[gap]) > 5.0
+    readings[gap, SENSORS.index("vx_mps")] = np.nan
+    found = SideslipObserver(vehicle, kind=kind).run(np.full(drive.n, 1 / drive.rate_hz), readings)
+    vx = found[gap, SideslipEstimate._fields.index("vx_mps")]
+    assert np.sqrt(np.mean((vx - speed[gap]) ** 2)) < 0.3
+    assert (found[gap, MODE] == 2).all()
+
+
 @pytest.mark.parametrize("channel", range(5))
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_mode_says_where_a_reading_is_missing(vehicle, dt, sensors, kind, channel):

@@ -56,6 +56,7 @@ class SideslipUkf {
   private:
     void start(const SensorSample& s);
     void run(double dt, const SensorSample& s);
+    double blind_speed(double dt, const SensorSample& s) const;
     double slowing(double dt, const SensorSample& now) const;
     bool lost() const;
     void report(const SensorSample& s);
