@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from design import Trial
+from design import ROADS, Trial
 
 import sysid_vehicle as sv
 from sysid_vehicle.simulate import Drive, drive_truth
@@ -15,6 +16,8 @@ RATE_HZ = 50.0
 _G = 9.81
 # A car that spins tells nothing: the driver tries again with less.
 _EASIER = (1.0, 0.85, 0.7, 0.55)
+_SLOPE_RAD = {"hills": 0.015}  # standard deviation of grade and of crossfall
+_ROAD_S = 50.0
 # Validation data asks no more of the tyres than the fit has seen: no model knows what comes then.
 _COURSE_MPS2 = {"ramp": 8.0, "sweep": 3.0, "step": 5.5, "lap": 8.0, "all": 8.0}
 
@@ -52,16 +55,25 @@ def baseline(name: str) -> sv.Model:
     return sv.Model(vehicle(name).replace(**other))
 
 
-def manoeuvres(driving: str, ease: float) -> tuple[sv.manoeuvres.Manoeuvre, ...]:
-    """The drives of one set, 25 to 40 s each; `ease` scales the lateral acceleration."""
+def manoeuvres(trial: Trial, ease: float) -> tuple[sv.manoeuvres.Manoeuvre, ...]:
+    """The drives of one set, 25 to 50 s each, and the course to validate on, as the last.
+
+    `ease` scales the lateral acceleration where the tyres come near to their limits.
+    """
     m = sv.manoeuvres
+    if trial.driving in ROADS:
+        rng = np.random.default_rng(trial.seed)
+        kinds: tuple[sv.manoeuvres.RoadKind, ...] = ("motorway", "country", "town", "country")
+        return tuple(m.usual_road(kind, _ROAD_S, rng) for kind in kinds)
+    course = max(_COURSE_MPS2[trial.driving], trial.course_mps2) * ease
     made = {
         "ramp": lambda: m.ramp_steer((18.0, 27.0), 8.6 * ease, 4.0),
         "sweep": lambda: m.sine_sweep(25.0, 25.0, 3.5 * ease),
         "step": lambda: m.step_steer((17.0, 27.0), (3.0 * ease, 6.0 * ease)),
         "lap": lambda: m.lap(40.0, 8.6 * ease),
     }
-    return tuple(made[name]() for name in (made if driving == "all" else (driving,)))
+    names = made if trial.driving == "all" else (trial.driving,)
+    return (*(made[name]() for name in names), m.handling_course(30.0, course))
 
 
 def hidden(trial: Trial) -> sv.Model:
@@ -103,10 +115,8 @@ def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
     """
     for ease in _EASIER:
         rng = np.random.default_rng(trial.seed)
-        lateral = max(_COURSE_MPS2[trial.driving], trial.course_mps2) * ease
-        course = sv.manoeuvres.handling_course(30.0, lateral)
         try:
-            logs = [drive_one(trial, m, rng) for m in (*manoeuvres(trial.driving, ease), course)]
+            logs = [drive_one(trial, m, rng) for m in manoeuvres(trial, ease)]
         except sv.NumericalError:
             if ease == _EASIER[-1]:
                 raise
@@ -117,9 +127,9 @@ def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
 
 def drive_one(trial: Trial, manoeuvre: sv.manoeuvres.Manoeuvre, rng: np.random.Generator) -> sv.Log:
     """Drive one manoeuvre with what is hidden and the noise of the trial."""
-    road = sv.RoadDisturbance()
+    road = sv.RoadDisturbance(slope_rad=_SLOPE_RAD.get(trial.driving, 0.0))
     if trial.noise == "coloured force":
-        road = sv.RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
+        road = replace(road, fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
     sensors = sv.SensorNoise().scaled(2.5 if trial.noise == "high" else 1.0)
     seed = int(rng.integers(2**31))
     truth = hidden(trial)
@@ -147,7 +157,9 @@ class _Pushed(sv.RoadDisturbance):
 
     def sample(self, n: int, rate_hz: float, rng: np.random.Generator) -> Array:
         road = super().sample(n, rate_hz, rng)
-        return road if self.told is None else np.ascontiguousarray(road + self.told)
+        if self.told is not None:
+            road[:, : self.told.shape[1]] += self.told  # slopes stand in columns behind the forces
+        return road
 
 
 def pushed(

@@ -15,49 +15,20 @@ import subprocess
 import sys
 import time
 import warnings
+from typing import get_args
 
 import numpy as np
 
 import sysid_vehicle as sv
-from sysid_vehicle.manoeuvres import Knots, Manoeuvre
+from sysid_vehicle.manoeuvres import RoadKind, usual_road
 
-# Speeds [m/s], straights [s], lateral accelerations [m/s2], bends [s].
-ROADS = {
-    "motorway": ((25.0, 36.0), (20.0, 60.0), (0.4, 2.0), (3.0, 12.0)),
-    "country": ((14.0, 27.0), (4.0, 20.0), (1.0, 5.5), (2.0, 6.0)),
-    "town": ((6.0, 14.0), (3.0, 10.0), (1.5, 4.5), (1.5, 4.0)),
-}
-_IN_S = 1.2  # into a bend, and out of it
-
-
-def road(kind: str, duration_s: float, rng: np.random.Generator) -> Manoeuvre:
-    """Straights and bends, at a speed that changes little from one to the next."""
-    (slow, fast), straight, lateral, bend = ROADS[kind]
-    at, ends, speed = [0.0], [], rng.uniform(slow, fast)
-    speeds, sides = [speed], [0.0]
-    time_s = 0.0
-    while time_s < duration_s - 15.0:
-        time_s += rng.uniform(*straight)
-        speed = float(np.clip(speed + rng.uniform(-0.35, 0.35) * (fast - slow), slow, fast))
-        side = rng.uniform(*lateral) * rng.choice([-1.0, 1.0])
-        held = rng.uniform(*bend)
-        at += [time_s, time_s + _IN_S, time_s + _IN_S + held, time_s + 2.0 * _IN_S + held]
-        sides += [0.0, side, side, 0.0]
-        ends += [time_s, time_s + 2.0 * _IN_S + held]
-        speeds += [speed, speed]
-        time_s = at[-1]
-    path = Knots(tuple(at), tuple(sides), smooth=True)
-    return Manoeuvre(kind, "usual road", duration_s, _knots(ends, speeds), path, True)
-
-
-def _knots(ends: list[float], speeds: list[float]) -> Knots:
-    return Knots((0.0, *ends), tuple(speeds), smooth=True)
+KINDS: tuple[RoadKind, ...] = get_args(RoadKind)
 
 
 def drive(seed: int) -> tuple[str, sv.Log]:
     """One drive, all of it drawn by the seed, and what it was."""
     rng = np.random.default_rng(seed)
-    kind = str(rng.choice(list(ROADS)))
+    kind = KINDS[int(rng.integers(len(KINDS)))]
     duration_s, slope = rng.choice([60.0, 100.0, 150.0]), rng.choice([0.0, 0.015])
     push, rate_hz = rng.choice([0.0, 1.0]), float(rng.choice([50.0, 100.0]))
     ground = sv.RoadDisturbance(
@@ -67,7 +38,7 @@ def drive(seed: int) -> tuple[str, sv.Log]:
         correlation_time_s=0.3,
         slope_rad=float(slope),
     )
-    course = road(kind, float(duration_s), rng)
+    course = usual_road(kind, float(duration_s), rng)
     model = sv.Model(sv.example_vehicle())
     log = sv.drive(model, course, seed=seed, disturbance=ground, rate_hz=rate_hz)
     hills = "hills" if slope else "level"

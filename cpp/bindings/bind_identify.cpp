@@ -59,7 +59,9 @@ Noise to_noise(const Array& values) {
     for (auto& s : noise.disturbance) s = *v++;
     for (auto& s : noise.correlation_time_s) s = *v++;
     for (auto& s : noise.road) s = *v++;
-    noise.road_time_s = *v;
+    noise.road_time_s = *v++;
+    for (auto& s : noise.colour) s = *v++;
+    for (auto& s : noise.colour_time_s) s = *v++;
     return noise;
 }
 
@@ -86,7 +88,7 @@ void register_identify(py::module_& m) {
     m.attr("LANES") = kLanes;
     m.attr("SHIFT_REACH") = kShiftReach;
     m.attr("CHANNELS") = static_cast<int>(kChannels);
-    m.attr("EXTERNALS") = static_cast<int>(kExternals);
+    m.attr("EXTERNALS") = static_cast<int>(kPushes);
     py::class_<LogwiseProblem> bound(m, "Problem");
     py::class_<LogwiseFilter>(m, "FrozenFilter")
         .def_readonly("log_likelihood", &LogwiseFilter::log_likelihood)
@@ -150,7 +152,7 @@ void register_identify(py::module_& m) {
             [](const LogwiseProblem& self, const Array& p, const LogwiseFilter& filter,
                const Array& signals, const std::vector<int>& targets) {
                 check_runs(self, filter);
-                check_numbers(targets, kExternals + kChannels, "targets");
+                check_numbers(targets, kPushes + kChannels, "targets");
                 const double* values = values_of(p);
                 const double* s = matrix(signals, static_cast<py::ssize_t>(self.samples()),
                                          static_cast<py::ssize_t>(targets.size()), "signals");

@@ -45,12 +45,12 @@ void register_simulate(py::module_& m) {
             const std::vector<Reference> wanted = references_of(references);
             const auto n = references.shape(0);
             const double* values = vector(p, kParameterCount, "parameters");
-            const bool slopes = disturbance.ndim() == 2 && disturbance.shape(1) == kExternals;
-            const py::ssize_t wide = slopes ? kExternals : 3;
+            const bool slopes = disturbance.ndim() == 2 && disturbance.shape(1) == kPushes;
+            const py::ssize_t wide = slopes ? kPushes : 3;
             const double* d = matrix(disturbance, n, wide, "disturbance");
-            std::vector<double> external(static_cast<std::size_t>(n * kExternals));
+            std::vector<double> external(static_cast<std::size_t>(n * kPushes));
             for (py::ssize_t k = 0; k < n; ++k)
-                std::copy_n(d + k * wide, wide, external.begin() + k * kExternals);
+                std::copy_n(d + k * wide, wide, external.begin() + k * kPushes);
             const py::ssize_t width = channels.ndim() == 2 ? channels.shape(1) : 0;
             if (width > static_cast<py::ssize_t>(kUserChannels))
                 throw std::invalid_argument("channels: there are more than there is room for");

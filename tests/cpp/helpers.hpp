@@ -162,6 +162,14 @@ inline Noise sloping_noise() {
     return noise;
 }
 
+/// The same with noise of sensors that is correlated in time.
+inline Noise coloured_noise() {
+    Noise noise = sloping_noise();
+    noise.colour = {0.001, 0.04, 0.05};
+    noise.colour_time_s = {0.04, 0.1, 0.06};
+    return noise;
+}
+
 /// A drive with sensor noise, `samples` long; `steer_part` scales the steering.
 inline Run noisy_run(const SingleTrack& model, const Parameters& p, std::size_t samples, double dt,
                      unsigned seed, double steer_part = 1.0) {

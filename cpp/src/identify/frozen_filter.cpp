@@ -74,7 +74,7 @@ FrozenFilter empty(const Problem& problem, const double* p, const Noise& noise) 
 
 std::vector<int> filter_rows(EffectMask effects, std::size_t disturbances) {
     std::vector<int> rows;
-    rows.reserve(kStatesFull + kRoadStates);
+    rows.reserve(kStatesFull + kRoadStates + kColourStates);
     for (int i = 0; i < kMotionStates; ++i) rows.push_back(i);
     for (const std::size_t i : active_states(effects))
         rows.push_back(kStatesPlain + static_cast<int>(i));

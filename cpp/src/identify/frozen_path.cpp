@@ -99,10 +99,8 @@ void walk_run(const Problem& problem, std::size_t number, const double* p, const
     const Run& run = problem.runs[number];
     const ActiveStates own = active_states(model.effects);
     const std::size_t moved = kMotionStates + own.count, disturbances = gains.states() - moved;
-    std::array<double, kDisturbances> forget;
-    for (std::size_t i = 0; i < kDisturbances; ++i)
-        forget[i] = gains.filter().noise.forget(i, run.dt);
-    static_assert(kDisturbances == kExternals);
+    std::array<double, kExternals> forget;
+    for (std::size_t i = 0; i < kExternals; ++i) forget[i] = gains.filter().noise.forget(i, run.dt);
     ModelState<double> x = initial_state(model, run, p);
     const bool settles = gains.without(own.count);
     std::array<double, kExternals> disturbance{};

@@ -26,7 +26,6 @@ LocalModel::LocalModel(const SingleTrack& model, const double* p, const std::vec
 
 std::vector<double> LocalModel::start(const Run& run) const {
     std::vector<double> out(states() * width_, 0.0);
-    if (model_.own().count == 0) return out;
     Ready all = model_.start_of(run);
     RecordedModel::sweep(all, [&](std::size_t output, std::size_t input, const LaneRow* row) {
         for (const std::size_t j : columns_of_[input]) out[output * width_ + j] = at(row, 0);

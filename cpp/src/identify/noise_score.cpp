@@ -15,16 +15,18 @@ namespace sysid {
 namespace {
 
 constexpr int deviation_lane(std::size_t i) {
+    if (i >= kPushes) return kRoadNoiseParameters + static_cast<int>(i) - kPushes;
     const int before = i < kMotionStates ? kMotionStates : 2 * kMotionStates;
     return kChannels + before + static_cast<int>(i);
 }
 constexpr int time_lane(std::size_t i) {
+    if (i >= kPushes) return deviation_lane(i) + kColourStates;
     return i < kMotionStates ? kChannels + 2 * kMotionStates + static_cast<int>(i)
-                             : kNoiseParameters - 1;
+                             : kRoadNoiseParameters - 1;
 }
 
-/// Of `L` noise parameters: those of disturbances and of the road only where there are such. Of `n`
-/// states the first `moving` have a transition; the disturbances stand where `disturbing` says.
+/// Of `L` noise parameters: those of disturbances, road and colour only where there are such. Of
+/// `n` states the first `moving` have a transition; the disturbances stand where `disturbing` says.
 template <int L, class Disturbing>
 NoiseScore<kChannels, L> score_of(const Noise& noise, const Run& run, int n, int moving,
                                   Disturbing&& disturbing) {
@@ -165,7 +167,8 @@ double handed_on(Sum<L> sum, double* gradient, double* information) {
 template <class Score>
 double with_parameters(const Noise& noise, Score&& score) {
     if (noise.white()) return score(std::integral_constant<int, kChannels + kMotionStates>{});
-    if (noise.sloping()) return score(std::integral_constant<int, kNoiseParameters>{});
+    if (noise.coloured()) return score(std::integral_constant<int, kNoiseParameters>{});
+    if (noise.sloping()) return score(std::integral_constant<int, kRoadNoiseParameters>{});
     return score(std::integral_constant<int, kPlainNoiseParameters>{});
 }
 

@@ -32,7 +32,8 @@ class Derivatives {
           signals_(signals),
           width_(padded(signals != nullptr ? signals->targets->size() : columns.size())),
           local_(problem.model, p, columns, width_,
-                 signals != nullptr ? std::size_t{kExternals} : filter.noise.disturbances()),
+                 std::max(filter.noise.disturbances(),
+                          signals != nullptr ? std::size_t{kPushes} : std::size_t{0})),
           states_(local_.states()),
           externals_(local_.externals()),
           samples_(kTogether),
@@ -143,13 +144,13 @@ class Derivatives {
         const std::vector<int>& targets = *signals_->targets;
         const double* values = signals_->values + k * targets.size();
         for (std::size_t j = 0; j < targets.size(); ++j)
-            if (targets[j] < kExternals) row[j] += by_external[targets[j]] * values[j];
+            if (targets[j] < kPushes) row[j] += by_external[targets[j]] * values[j];
     }
 
     void shift(std::size_t channel, std::size_t k, double* row) const {
         const std::vector<int>& targets = *signals_->targets;
         for (std::size_t j = 0; j < targets.size(); ++j)
-            if (targets[j] == kExternals + static_cast<int>(channel))
+            if (targets[j] == kPushes + static_cast<int>(channel))
                 row[j] += signals_->values[k * targets.size() + j];
     }
 

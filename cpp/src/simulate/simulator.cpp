@@ -72,7 +72,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     for (std::size_t k = 0; k < references.size(); ++k) {
         poll_interrupt(k);
         u.time_s = acting.time_s = beginning.time_s + static_cast<double>(k) * dt;
-        for (std::size_t i = 0; i < kExternals; ++i) external[i] = disturbance[kExternals * k + i];
+        for (std::size_t i = 0; i < kPushes; ++i) external[i] = disturbance[kPushes * k + i];
         const auto y = sense(model, x, external.data(), acting, p);
         const double written = earlier(commanded, std::max(-late, 0.0));
         out.inputs.insert(out.inputs.end(), {written, u.longitudinal});

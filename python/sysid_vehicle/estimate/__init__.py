@@ -7,16 +7,8 @@ from .driving import UNITS, Driving
 from .filters import FilterRun, FilterState, StateFilter, StateModel
 from .input_noise import again, noisier
 from .late import LateMeasurements
-from .noise import (
-    Learned,
-    NoiseModel,
-    first_guess,
-    generous,
-    learn_noise,
-    maximise_noise,
-    noise_range,
-    promised_by_noise,
-)
+from .learn_noise import Learned, learn_noise, maximise_noise, promised_by_noise
+from .noise import NoiseModel, first_guess, generous, noise_range
 from .samples import steering_reach
 from .turning import equal_blocks, moving, turning, turning_blocks
 

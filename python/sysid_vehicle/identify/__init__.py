@@ -22,6 +22,7 @@ from .offsets import driving_beside, driving_of
 from .predictive import Prediction, predict
 from .runs.runs import Difference, RunsFit, identify_runs
 from .search.box import free_box, objective_of
+from .search.scanned import longest_s
 from .search.search import METHODS
 from .search.settle import settle
 from .search.starts import Start, Starts
@@ -47,6 +48,7 @@ __all__ = [
     "free_box",
     "identify",
     "identify_runs",
+    "longest_s",
     "lost_to_input_noise",
     "objective_of",
     "predict",

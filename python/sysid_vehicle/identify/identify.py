@@ -22,16 +22,8 @@ from .beside_noise import beside_noise
 from .contained import above_contained
 from .fit import Fit
 from .intervals.estimates import BETTER_FOUND, INTERVALS, profiled_estimates
-from .maximum import (
-    THINNED,
-    another_top,
-    log_likelihood_of,
-    objectives,
-    on_its_road,
-    refine,
-    summary,
-    top,
-)
+from .kinds_of_noise import on_its_road, with_coloured_sensors
+from .maximum import THINNED, another_top, log_likelihood_of, objectives, refine, summary, top
 from .offsets import centred
 from .search.box import free_box, objective_of
 from .search.objective import Objective
@@ -251,7 +243,7 @@ def _from_ends(
         best = rivalled(objective, best, elsewhere, box, thinned)
     if best is not at_top:
         fit = top(model, driving, objective, best, table, thinned)
-    return with_own_offsets(on_its_road(fit))
+    return with_own_offsets(with_coloured_sensors(on_its_road(fit)))
 
 
 def _check(model: Model, driving: Driving) -> None:

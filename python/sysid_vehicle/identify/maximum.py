@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._common.arrays import FloatArray, as_float64
+from ..effects import Effect
 from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
@@ -20,17 +21,15 @@ from .search.box import NO_LAG, free_box, objective_of
 from .search.climb import FAR_BELOW, to_the_top
 from .search.objective import Objective
 from .search.other_noise import likelier_noise
-from .search.settle import moved, settle
+from .search.scanned import go_on, scans
+from .search.settle import settle
 from .search.starts import Starts
 
-_SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
-_HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 _FAR_BELOW_BY_FEW = 50.0  # nats on few samples, chosen as `FAR_BELOW`
 # Nats, most that a lag, and any one effect, climbed from where it had settled (`FAR_BELOW`).
 _CLIMBS, _ANY_CLIMBS = 4.0, 100.0
-_ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
 # Nats, and standard errors, between maxima that are one: climbs end so far from each other.
 _SAME, _NEAR = 0.5, 0.5
 
@@ -192,21 +191,16 @@ def refit(
     *,
     rounds: int = 3,
     inputs: FloatArray | None = None,
+    scanned: Sequence[Effect] = (),
 ) -> Fit:
     """Parameters alone, from a model's values, under a noise model that stays as it is.
 
-    The likelihood is never lower than that of the values it starts from. `inputs` as for `refine`.
+    The likelihood is never lower than that of the values it starts from. What the effects `scanned`
+    have that is scanned is tried at many values. `inputs` as for `refine`.
     """
-    box = free_box(model)
     objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
-    p = box.inside(model.vector())
-    gains, value = None, -np.inf
-    for _ in range(rounds):
-        before, best = p, value
-        p, gains = moved(objective, p, noise.vector(), box, rounds=8, tolerance=0.2)
-        value = objective.reached(p, gains)
-        if value < best + _ENOUGH or box.near(p, before, 1e-4):
-            break
+    tried = scans(model, scanned, driving)
+    p, gains = go_on(objective, model, noise.vector(), rounds, tried)
     return summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
 
 
@@ -331,22 +325,6 @@ def _likeliest(
     p, noise = likelier_noise(objective, at_top, free_box(model), few)
     told = NoiseModel.from_vector(noise)
     return summary(model, driving, objective, p, told, starts, converged)
-
-
-def on_its_road(fit: Fit) -> Fit:
-    """The same fit where the road is level, another where its slope varies."""
-    model, driving, p = fit.model, fit.driving, fit.model.vector()
-    objective = objective_of(model, driving.problem(model), driving)
-    sloping = [replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2]
-    values = [log_likelihood_of(objective, p, noise.vector()) for noise in sloping]
-    best = sloping[int(np.argmax(values))]
-    if max(values) < fit.log_likelihood + _HINT:
-        return fit
-    learned, value, _ = objective.learn_noise(p, best.vector(), rounds=6)
-    if value < fit.log_likelihood + _SHOWN:
-        return fit
-    found = polish(model, driving, p, NoiseModel.from_vector(learned), fit.starts)
-    return found if found.log_likelihood > fit.log_likelihood else fit
 
 
 def log_likelihood_of(objective: Objective, p: FloatArray, noise: FloatArray) -> float:

@@ -14,6 +14,7 @@ from .on_path import (
 )
 from .open_loop import STEP_S, ramp_steer, sine_sweep, sine_with_dwell, step_steer
 from .recognise import Recognised, recognise
+from .roads import RoadKind, usual_road
 from .steady import peak_lateral_mps2, steady_steer, understeer_gradient
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "Pulse",
     "Pulses",
     "Recognised",
+    "RoadKind",
     "Sweep",
     "all",
     "brake_in_turn",
@@ -42,11 +44,12 @@ __all__ = [
     "step_steer",
     "straight_acceleration",
     "understeer_gradient",
+    "usual_road",
 ]
 
 
 def all() -> dict[str, Manoeuvre]:
-    """Make every manoeuvre of the package with its default parameters, by name."""
+    """Make every manoeuvre with its default parameters, by name; roads are drawn, and none."""
     made = (
         lap(),
         handling_course(),

@@ -231,7 +231,8 @@ std::vector<Point> points() {
     for (int n = 0; n < 4; ++n) {
         Point point{"random", {}, {}, {}, {}};
         point.x = {25.0 + 12.0 * part(generator), part(generator), 0.4 * part(generator)};
-        for (double& external : point.external) external = 0.3 * part(generator);
+        point.external.fill(0.1);
+        for (int i = 0; i < kPushes; ++i) point.external.at(i) = 0.3 * part(generator);
         point.from = {0.08 * part(generator), 2000.0 + 1000.0 * part(generator)};
         point.to = {point.from.steer_rad + 0.01, point.from.longitudinal + 200.0};
         all.push_back(point);

@@ -17,7 +17,9 @@ Noise scaled(const Noise& noise, const Values& logs) {
     for (double& s : out.disturbance) s *= std::exp(logs[i++]);
     for (double& s : out.correlation_time_s) s *= std::exp(logs[i++]);
     for (double& s : out.road) s *= std::exp(logs[i++]);
-    out.road_time_s *= std::exp(logs[i]);
+    out.road_time_s *= std::exp(logs[i++]);
+    for (double& s : out.colour) s *= std::exp(logs[i++]);
+    for (double& s : out.colour_time_s) s *= std::exp(logs[i++]);
     return out;
 }
 
@@ -63,8 +65,8 @@ TEST_P(NoiseScore, IsTheGradientOfTheLogLikelihood) {
     // Away from the optimum, so that every derivative is of a size.
     Values off;
     off << 0.3, -0.2, 0.3, -0.3, 0.2, 0.5, -0.5, 0.5, 0.4, -0.4, 0.4, 0.5, -0.2, 0.3, 0.2, -0.3,
-        0.4;
-    const Noise noise = scaled(sloping_noise(), off);
+        0.4, 0.3, -0.3, 0.2, -0.2, 0.3, 0.2;
+    const Noise noise = scaled(coloured_noise(), off);
     const Score s = score(problem, p, noise);
     EXPECT_NEAR(s.value, freeze(problem, p.data(), noise).log_likelihood, 1e-9);
     for (int i = 0; i < kNoiseParameters; ++i) {
@@ -82,7 +84,7 @@ TEST_P(NoiseScore, IsTheGradientOfTheLogLikelihood) {
 }
 
 TEST_P(NoiseScore, InformationIsSymmetricAndPositive) {
-    const Score s = score(mild(effects(), 37), typical_parameters(), sloping_noise());
+    const Score s = score(mild(effects(), 37), typical_parameters(), coloured_noise());
     EXPECT_EQ((s.information - s.information.transpose()).norm(), 0.0);
     const Eigen::VectorXd values = symmetric_eigenvalues(s.information);
     EXPECT_GT(values.minCoeff(), -1e-9 * values.maxCoeff());
@@ -103,6 +105,20 @@ TEST_P(NoiseScore, ALevelRoadIsTheLimitOfOneThatHardlyWanders) {
     EXPECT_EQ(level.gradient.tail(kNoiseParameters - plain).norm(), 0.0);
     EXPECT_EQ(level.information.rightCols(kNoiseParameters - plain).norm(), 0.0);
     EXPECT_EQ(level.information.bottomRows(kNoiseParameters - plain).norm(), 0.0);
+}
+
+TEST_P(NoiseScore, WhiteSensorsAreTheLimitOfThoseWithHardlyAnyColour) {
+    const Problem problem = mild(effects(), 40);
+    const Parameters p = typical_parameters();
+    const Score white = score(problem, p, sloping_noise());
+    Noise hardly = sloping_noise();
+    hardly.colour = {1e-9, 1e-7, 1e-7};
+    const Score limit = score(problem, p, hardly);
+    EXPECT_NEAR(white.value, limit.value, 1e-6);
+    const int plain = kRoadNoiseParameters;
+    EXPECT_LT((white.gradient - limit.gradient).head(plain).norm(), 1e-6 * white.gradient.norm());
+    EXPECT_EQ(white.gradient.tail(kNoiseParameters - plain).norm(), 0.0);
+    EXPECT_EQ(white.information.rightCols(kNoiseParameters - plain).norm(), 0.0);
 }
 
 TEST_P(NoiseScore, InformationIsOfTheOrderOfTheCurvature) {
@@ -150,7 +166,7 @@ TEST_P(NoiseScore, AlongAFilterThatHasRunIsTheSame) {
     const Parameters p = typical_parameters();
     Noise white = ordinary_noise();
     white.disturbance.fill(0.0);
-    for (const Noise& noise : {ordinary_noise(), sloping_noise(), white}) {
+    for (const Noise& noise : {ordinary_noise(), sloping_noise(), coloured_noise(), white}) {
         const Score whole = score(problem, p, noise);
         FrozenFilter filter = freeze(problem, p.data(), noise);
         ASSERT_TRUE(filter.tells());

@@ -64,7 +64,8 @@ int column_of(const std::string& effect, std::size_t which = 0) {
 TEST(PredictionError, ResidualsAreTheFiltersWhitenedInnovations) {
     for (const auto& [effects, noise] :
          {std::pair{kPlain, ordinary_noise()}, std::pair{kLate, ordinary_noise()},
-          std::pair{kPlain, sloping_noise()}, std::pair{kLate, sloping_noise()}}) {
+          std::pair{kPlain, sloping_noise()}, std::pair{kLate, sloping_noise()},
+          std::pair{kPlain, coloured_noise()}}) {
         const Problem problem = two_runs(effects);
         const Parameters p = typical_parameters();
         const FrozenFilter filter = freeze(problem, p.data(), noise);
@@ -230,7 +231,7 @@ TEST(PredictionError, ConstantSignalsAnswerLikeTheEffectsThatAreConstant) {
     const Parameters p = typical_parameters();
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
     const std::vector<int> targets{kForceY, kMomentZ, kGravityX,
-                                   kExternals + static_cast<int>(kYawRate)};
+                                   kPushes + static_cast<int>(kYawRate)};
     const Rows ones = Rows::Ones(static_cast<int>(problem.samples()), 4);
     const Rows answers = signals_of(problem, p, filter, ones, targets);
     const Rows G = sensitivities_of(problem, p, filter,
@@ -253,7 +254,7 @@ TEST(PredictionError, SignalOnAReadingIsTakenOffTheMeasurement) {
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
     const auto n = static_cast<int>(problem.samples());
     std::vector<int> targets;
-    for (int j = 0; j < 10; ++j) targets.push_back(kExternals + j % kChannels);
+    for (int j = 0; j < 10; ++j) targets.push_back(kPushes + j % kChannels);
     Rows signals(n, 10);
     for (int k = 0; k < n; ++k)
         for (int j = 0; j < 10; ++j) signals(k, j) = 1e-3 * std::sin(0.1 * (j + 1) * k + j);

@@ -122,7 +122,8 @@ TEST_P(SideBySide, SmoothedMeansAreThoseOfTheWholeSmoother) {
         // States without noise make a covariance singular that the whole smoother inverts: it
         // leaves out directions that are surer than rounding. Means alone need no inverse.
         const double close = effects == EffectMask{0} ? 1e-9 : 5e-3;
-        for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()}) {
+        for (const Noise& noise :
+             {ordinary_noise(), sloping_noise(), coloured_noise(), white_noise()}) {
             const Problem problem = long_run(effects);
             const Trace smoothed = trace(problem, p.data(), noise, true);
             std::vector<double> means(problem.samples() * kStatesFull);
@@ -150,7 +151,8 @@ TEST_P(SideBySide, SmoothedMeansAreThoseOfTheWholeSmoother) {
 TEST_P(SideBySide, FiltersAreThoseOfWholeRuns) {
     bool cut = false;
     for (const EffectMask effects : {EffectMask{0}, kLagging})
-        for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()}) {
+        for (const Noise& noise :
+             {ordinary_noise(), sloping_noise(), coloured_noise(), white_noise()}) {
             const Problem problem = long_run(effects);
             ASSERT_EQ(pieces_of(problem.runs).size(), 16U);
             cut = expect_whole(problem, noise) || cut;

@@ -40,7 +40,8 @@ Linear linear_of(const Problem& problem, const Parameters& p, const FrozenFilter
 TEST(Told, PathIsThatOfAWalk) {
     const Parameters p = typical_parameters();
     for (const EffectMask effects : {EffectMask{0}, kLagAndDrag})
-        for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()})
+        for (const Noise& noise :
+             {ordinary_noise(), sloping_noise(), coloured_noise(), white_noise()})
             for (const std::size_t samples : {120U, 2400U}) {
                 const Problem problem = runs_of(effects, samples);
                 const FrozenFilter filter = freeze(problem, p.data(), noise);
@@ -133,7 +134,8 @@ TEST(Told, WhereRoundingMayCountTheFilterIsTheCarefulOne) {
 TEST(Told, TraceIsThatOfTheFilter) {
     const Parameters p = typical_parameters();
     for (const EffectMask effects : {EffectMask{0}, kLagAndDrag})
-        for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()}) {
+        for (const Noise& noise :
+             {ordinary_noise(), sloping_noise(), coloured_noise(), white_noise()}) {
             const Problem problem = runs_of(effects, 240);
             const FrozenFilter filter = freeze(problem, p.data(), noise);
             const Trace whole = trace(problem, p.data(), noise, false);

@@ -10,7 +10,7 @@ namespace {
 constexpr double kStep = 0.01;
 
 Drive drive_along(const std::vector<Reference>& references, const Driver& driver,
-                  double initial_speed, const std::array<double, kExternals>& disturbance = {},
+                  double initial_speed, const std::array<double, kPushes>& disturbance = {},
                   EffectMask effects = 0) {
     std::vector<double> pushes;
     for (std::size_t k = 0; k < references.size(); ++k)
@@ -95,7 +95,7 @@ TEST(Simulator, BeginsInTheMiddleOfACorner) {
     driver.tracks_path = false;
     const auto drive = [&](std::size_t n, const Beginning& beginning) {
         const std::vector<Reference> steered(n, {20.0, 0.0, 0.03});
-        const std::vector<double> calm(kExternals * n, 0.0);
+        const std::vector<double> calm(kPushes * n, 0.0);
         return simulate({saloon(), effects}, p.data(), kStep, steered, driver, calm.data(),
                         beginning);
     };
@@ -118,7 +118,7 @@ TEST(Simulator, BeginsInTheMiddleOfACorner) {
 TEST(Simulator, EndsWhereItIsTooFarAway) {
     // Half a circle of 20 m radius, at 10 m/s: nowhere farther away than its width.
     const std::vector<Reference> circle(1000, {10.0, 0.05, 0.0});
-    const std::vector<double> calm(kExternals * circle.size(), 0.0);
+    const std::vector<double> calm(kPushes * circle.size(), 0.0);
     const Parameters p = typical_parameters();
     const auto within = [&](double farthest_m) {
         return simulate({saloon(), 0}, p.data(), kStep, circle, {}, calm.data(), {10.0}, {},
@@ -136,7 +136,7 @@ TEST(Simulator, EndsWhereItIsTooFarAway) {
 TEST(Simulator, EndsWhenSpun) {
     Driver driver;
     driver.tracks_path = false;
-    const std::array<double, kExternals> spinning{0.0, 0.0, 30000.0};
+    const std::array<double, kPushes> spinning{0.0, 0.0, 30000.0};
     const Drive drive = drive_along({2000, {30.0, 0.0, 0.0}}, driver, 30.0, spinning);
     ASSERT_LT(drive.lost_at, 2000U);
     EXPECT_GT(drive.lost_at, 10U);
@@ -158,7 +158,7 @@ TEST(Simulator, EndsWhenStopped) {
 TEST(Simulator, Deterministic) {
     std::vector<Reference> references;
     for (int k = 0; k < 800; ++k) references.push_back({22.0, 0.008 * std::sin(0.01 * k), 0.0});
-    const std::array<double, kExternals> gust{50.0, -80.0, 30.0};
+    const std::array<double, kPushes> gust{50.0, -80.0, 30.0};
     const Drive a = drive_along(references, {}, 22.0, gust, kAllEffects);
     const Drive b = drive_along(references, {}, 22.0, gust, kAllEffects);
     EXPECT_EQ(a.lost_at, 800U);
@@ -171,13 +171,13 @@ TEST(Simulator, RecordsWhatTheModelComputes) {
     // From one recorded sample to the next with the recorded inputs, by the integrator itself.
     std::vector<Reference> references;
     for (int k = 0; k < 300; ++k) references.push_back({22.0, 0.008 * std::sin(0.02 * k), 0.0});
-    const std::array<double, kExternals> gust{50.0, -80.0, 30.0};
+    const std::array<double, kPushes> gust{50.0, -80.0, 30.0};
     // What acts with a dead time is not what was recorded at that sample.
     const EffectMask effects = kAllEffects & ~mask_of({"steer_delay"});
     const Drive drive = drive_along(references, {}, 22.0, gust, effects);
     const SingleTrack model{saloon(), effects};
     const Parameters p = typical_parameters();
-    const std::array<double, kExternals> external{50.0, -80.0, 30.0, 0.0, 0.0};
+    const std::array<double, kExternals> external{50.0, -80.0, 30.0};
     for (std::size_t k = 0; k + 1 < samples(drive); ++k) {
         ModelState<double> x;
         std::copy_n(&drive.states[k * kModelStates], kModelStates, x.begin());

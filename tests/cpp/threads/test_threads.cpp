@@ -65,7 +65,7 @@ TEST_F(SharedProblem, Score) {
 
 TEST_F(SharedProblem, Simulation) {
     const std::vector<Reference> references(300, Reference{20.0, 0.01, 0.02});
-    const std::vector<double> calm(kExternals * references.size());
+    const std::vector<double> calm(kPushes * references.size());
     const Driver driver{};
     expect_the_same([&] {
         return simulate(problem_.model, p_.data(), 0.01, references, driver, calm.data(), {})

@@ -64,9 +64,7 @@ def test_a_gap_inside_a_log_is_no_turn_of_the_wheel(truth: Model) -> None:
     assert len(evidence.driving.stretches) == 2
     first = turned - 100
     (section,) = evidence.sections()
-    p, noise = evidence.fit.model.vector(), evidence.fit.noise.vector()
-    state = evidence.problem.trace(p, noise, False)["state"]
-    signals = Unknown(evidence).signals(state, section.where)
+    signals = Unknown(evidence).signals(evidence.problem, section.where)
     assert not signals[first].any(), "nothing was known yet"
     turn = signals[:, 11]  # of the first target: the last of its shapes
     assert turn[first + 1] == 0.0, "the jump over the gap"
@@ -97,3 +95,23 @@ def test_a_driver_who_knows_the_speed_better_than_its_sensor_leaves_nothing(
     fit = identify(truth, log, starts=1)
     assert omnibus(fit, fit.driving).p_value > 0.01
     assert instead(fit, fit.driving, ()).omnibus.p_value > 0.01
+
+
+def test_noise_of_the_last_moments_is_in_no_signal(fit: Fit) -> None:
+    """Noise of sensors that lasts for some samples enters the errors that signals are to tell."""
+    log = fit.driving.logs[0]
+    columns = {c: log[c].copy() for c in log.channels}
+    k = log.n // 2
+    few = max(round(0.1 * log.rate_hz), 1)
+    columns["yaw_rate_radps"][k - few : k] += 0.02
+    columns["ay_mps2"][k - few : k] += 1.0
+    disturbed = Driving.of(Log.from_arrays(columns, name=log.name, check=False))
+    seen = []
+    for driving in (Driving.of(log), disturbed):
+        evidence = Evidence(fit, driving)
+        unknown = Unknown(evidence)
+        problem = next(evidence.sections()).evidence.problem
+        seen.append((evidence.filtered[k], np.array(unknown.foreseen(problem))[:, k]))
+    (filtered, foreseen), (other_filtered, other_foreseen) = seen
+    assert abs(filtered[2] - other_filtered[2]) > 1e-3
+    np.testing.assert_array_equal(foreseen, other_foreseen)

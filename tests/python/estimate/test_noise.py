@@ -33,12 +33,18 @@ SOME = NoiseModel(
 def test_the_core_vector_keeps_every_number() -> None:
     v = SOME.vector()
     assert v.tolist()[:11] == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 900.0, 1000.0, 1100.0]
-    assert v.tolist()[11:] == [0.25, 0.5, 0.75, 0.0, 0.0, 5.0]
+    assert v.tolist()[11:17] == [0.25, 0.5, 0.75, 0.0, 0.0, 5.0]
+    assert v.tolist()[17:] == [0.0, 0.0, 0.0, 0.05, 0.05, 0.05]
     assert NoiseModel.from_vector(v) == SOME
     sloping = replace(SOME, road=(0.1, 0.2), road_time_s=7.0)
     assert NoiseModel.from_vector(sloping.vector()) == sloping
     assert "deg across" in str(sloping)
     assert "deg across" not in str(SOME)
+    coloured = replace(sloping, colour=(0.003, 0.0, 0.1), colour_time_s=(0.1, 0.2, 0.3))
+    assert NoiseModel.from_vector(coloured.vector()) == coloured
+    assert coloured.floor().colour == coloured.colour
+    assert "ay_mps2, coloured 0.1 m/s2, correlation time 0.3 s" in str(coloured)
+    assert "ax_mps2, coloured" not in str(coloured)
 
 
 def test_one_correlation_time_stands_for_three() -> None:

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -120,11 +121,12 @@ def test_one_filter_has_room_for_the_states_that_lanes_have(
     model = model.with_values(
         {f"{e}.{p.name}": p.typical for e, part in lags.items() for p in part.parameters}
     )
-    noise, problem, p = fit.noise.vector(), driving.problem(model), model.vector()
-    noise[_core.NOISE_PARAMETERS - 3 :] = (0.1, 0.2, 5.0)  # a road of varying slope
-    one = problem.freeze(p, noise).log_likelihood
-    lanes = problem.log_likelihoods(np.tile(p, (4, 1)), noise)
-    np.testing.assert_allclose(lanes, one, rtol=1e-9)
+    problem, p = driving.problem(model), model.vector()
+    road = replace(fit.noise, road=(0.1, 0.2))
+    for noise in (road, replace(road, colour=(0.002, 0.1, 0.1))):
+        one = problem.freeze(p, noise.vector()).log_likelihood
+        lanes = problem.log_likelihoods(np.tile(p, (4, 1)), noise.vector())
+        np.testing.assert_allclose(lanes, one, rtol=1e-9)
 
 
 @pytest.mark.parametrize("column", [-1, _core.PARAMETERS])

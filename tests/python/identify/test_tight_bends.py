@@ -5,9 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sysid_vehicle import Log, Model, Vehicle
+from sysid_vehicle import Log, Model, Vehicle, drive, example_vehicle
 from sysid_vehicle.estimate import Driving, NoiseModel
 from sysid_vehicle.estimate.samples import thinned
+from sysid_vehicle.manoeuvres import RoadKind, usual_road
 
 CAR = Vehicle(
     name="one tenth",
@@ -93,3 +94,22 @@ def test_windows_that_begin_in_a_bend_cost_no_more_than_their_start() -> None:
     assert len(lost) > 10
     assert 5.0 < np.median(lost) < 20.0  # nothing is known yet
     assert max(lost) < 40.0
+
+
+@pytest.mark.parametrize("kind", ["town", "country"])
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_a_road_car_whose_log_begins_in_a_bend(kind: RoadKind, seed: int) -> None:
+    """Lateral speed is not measured, and the first reading finds the car at three quarters of g."""
+    model = Model(example_vehicle())
+    log = drive(model, usual_road(kind, 60.0, seed), seed=seed, rate_hz=50.0)
+    turning = np.flatnonzero(np.abs(log["ay_mps2"]) > 0.6 * np.abs(log["ay_mps2"]).max())
+    for k in turning[:: len(turning) // 8]:
+        part = slice(k, min(k + 100, log.n))
+        columns = {c: log[c][part] for c in log.channels if c != "vy_mps"}
+        driving = Driving.of(Log.from_arrays(columns, check=False))
+        noise = NoiseModel(
+            (0.03, 0.03, 0.0025, 0.06, 0.06), (0.005, 0.005, 0.001), (50.0, 50.0, 50.0), 0.3
+        )
+        problem = driving.problem(model)
+        state = problem.trace(model.vector(), noise.vector(), False)["state"]
+        assert np.abs(state[:, 1] - log["vy_mps"][part]).max() < 0.3

@@ -205,6 +205,8 @@ def test_smooth_knots_do_not_overshoot() -> None:
         (lambda: manoeuvres.double_lane_change(change_m=0.0), "double_lane_change: change_m"),
         (lambda: manoeuvres.constant_radius(duration_s=10.0), "more than 24 s"),
         (lambda: manoeuvres.brake_in_turn(radius_m=-1.0), "brake_in_turn: radius_m"),
+        (lambda: manoeuvres.usual_road("alley"), "kind = 'alley'; give one of motorway, country"),  # type: ignore[arg-type]
+        (lambda: manoeuvres.usual_road(duration_s=-1.0), "usual_road: duration_s = -1.0"),
     ],
 )
 def test_a_manoeuvre_that_cannot_be_is_refused(make: object, message: str) -> None:

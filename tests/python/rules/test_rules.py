@@ -50,7 +50,9 @@ NUMERICAL = {
     "diagnose/candidates/possible.py": {"_AT_BOUND"},
     "diagnose/candidates/posterior.py": {"_KEPT", "_LEAST"},
     "diagnose/candidates/widened.py": {"_FELT", "_ROUNDS", "_SETTLED"},
-    "diagnose/unexplained/omnibus.py": {"LEAST_LEFT", "_FEW_SHAPES", "_FORCE_SHAPES"},
+    "diagnose/unexplained/omnibus.py": {
+        "LEAST_LEFT", "_FEW_SHAPES", "_FORCE_SHAPES", "_FORESEEN_S",
+    },
     "diagnose/evidence/projection.py": {"COPIED", "_SINGULAR", "_LAGS", "_ROWS", "_TERMS"},
     "diagnose/experiment/replay.py": {
         "_RATE_HZ", "_WINDOW_S", "_LOOKS", "_ROUNDS", "_BENDS", "_AS_GOOD",

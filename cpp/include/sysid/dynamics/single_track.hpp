@@ -32,8 +32,21 @@ using Input = InputOf<double>;
 template <class S>
 using InputFor = InputOf<Given<S>>;
 
-/// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels.
-enum External : int { kForceX, kForceY, kMomentZ, kGravityX, kGravityY, kExternals };
+/// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels;
+/// and what readings of yaw rate, a_x and a_y have beside it.
+enum External : int {
+    kForceX,
+    kForceY,
+    kMomentZ,
+    kGravityX,
+    kGravityY,
+    kReadYawRate,
+    kReadAx,
+    kReadAy,
+    kExternals
+};
+/// Those that move the car.
+constexpr int kPushes = kReadYawRate;
 
 /// What the axle loads of an input that is held move from within its sample:
 ///   F_zf = F_zf(0) - h/L (m a_x - m a_x(0)) + A_f (v_x^2/v_x(0)^2 - 1),                     (6)

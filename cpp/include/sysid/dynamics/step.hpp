@@ -147,6 +147,9 @@ std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x,
                                   rate.data() + kMotionStates);
     std::array<S, kChannels> y;
     model.sense(w, p, x.data() + kMotionStates, y.data());
+    y[kYawRate] += external[kReadYawRate];
+    y[kAx] += external[kReadAx];
+    y[kAy] += external[kReadAy];
     return y;
 }
 

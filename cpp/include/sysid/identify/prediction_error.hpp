@@ -84,7 +84,7 @@ struct FrozenFilter {
 };
 
 /// Names of the states that a filter corrects: v_x, v_y, r, the states of effects, disturbances.
-/// They are places among `kStatesFull`; gravity along and across stand behind these. Of so many
+/// They are places among `kStatesFull`; gravity and coloured sensors stand behind these. Of so many
 /// disturbances, see `Noise::disturbances`.
 std::vector<int> filter_rows(EffectMask effects, std::size_t disturbances);
 
@@ -112,14 +112,14 @@ double normal_equations(const Problem& problem, const double* p, const FrozenFil
 double half_sum_of_squares(const Problem& problem, const double* p, const FrozenFilter& filter);
 
 /// Sensitivities to signals that act as forces or shift readings: column b answers to `signals`
-/// (samples x count, row-major) added to target b: an `External`, or kExternals + a `Channel` for a
-/// sensor reading.
+/// (samples x count, row-major) added to target b: an `External` that pushes, or kPushes + a
+/// `Channel` for a sensor reading.
 void signal_sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
                           const double* signals, const std::vector<int>& targets, double* out);
 
 /// Derivatives of the log-likelihood with respect to the logarithms of the noise parameters
-/// (sensor, motion, disturbance, correlation times, road and its time; without a road the last
-/// three are zero), and their expected information (row-major).
+/// (sensor, motion, disturbance, correlation times, road and its time, colour and its times; of
+/// what there is not they are zero), and their expected information (row-major).
 double noise_score(const Problem& logged, const double* p, const Noise& noise, double* gradient,
                    double* information);
 

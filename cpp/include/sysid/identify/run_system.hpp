@@ -11,8 +11,8 @@
 namespace sysid {
 
 /// State: v_x, v_y, r, disturbing F_x, F_y, M_z where there are such, then the states of the
-/// model's own effects, gravity along and across where the slope varies; what is left of NX stands
-/// still at zero and is certain.
+/// model's own effects, gravity along and across where the slope varies, coloured noise of sensors
+/// where there is any; what is left of NX stands still at zero and is certain.
 template <int NX>
 class RunSystem {
   public:
@@ -117,7 +117,7 @@ class RunSystem {
     std::size_t place(std::size_t i) const { return kMotionStates + own_.place[i]; }
     const ActiveStates& own() const { return own_; }
 
-    /// How many disturbances there are, and where number `i` stands: F_x, F_y, M_z, gravity.
+    /// How many disturbances there are, and where number `i`, an `External`, stands.
     std::size_t disturbances() const { return disturbances_; }
     int disturbing(std::size_t i) const {
         return i < kMotionStates ? kMotionStates + static_cast<int>(i)
@@ -175,7 +175,7 @@ class RunSystem {
     ActiveStates own_;
     ModelState<double> start_;
     std::size_t disturbances_;
-    std::array<double, kDisturbances> forget_{}, variance_{};
+    std::array<double, kExternals> forget_{}, variance_{};
     Mat<NX, NX> process_;
     Mat<kChannels, kChannels> sensors_;
 };
@@ -186,14 +186,16 @@ class RunSystem {
 constexpr int kStatesFew = kStatesPlain + 3;
 constexpr int kStatesSome = kStatesPlain + 6;
 constexpr int kStatesSeveral = kStatesPlain + 12;
-constexpr int kStatesMost =
-    (kStatesFull + kRoadStates + kWideStatePass - 1) / kWideStatePass * kWideStatePass;
+constexpr int kStatesMost = (kStatesFull + kRoadStates + kColourStates + kWideStatePass - 1) /
+                            kWideStatePass * kWideStatePass;
 
 /// Calls `use(std::integral_constant<int, NX>)` with a state size that holds the effects' states
-/// and those of the road.
+/// and those of the road and of coloured sensors.
 template <class Use>
 auto with_state_size(EffectMask effects, const Noise& noise, Use&& use) {
-    const std::size_t own = active_states(effects).count + (noise.sloping() ? kRoadStates : 0);
+    const std::size_t disturbances = noise.disturbances();
+    const std::size_t own = active_states(effects).count +
+                            (disturbances > kMotionStates ? disturbances - kMotionStates : 0);
     if (own == 0 && noise.white()) return use(std::integral_constant<int, kMotionStates>{});
     if (own == 0) return use(std::integral_constant<int, kStatesPlain>{});
     if (own <= 3) return use(std::integral_constant<int, kStatesFew>{});

@@ -33,7 +33,7 @@ struct Drive {
     std::size_t lost_at = 0;
 };
 
-/// `disturbance`: samples x kExternals. The drive ends where the car is lost, or farther than
+/// `disturbance`: samples x kPushes. The drive ends where the car is lost, or farther than
 /// `farthest_m` from where it began.
 Drive simulate(const SingleTrack& model, const double* p, double dt,
                const std::vector<Reference>& references, const Driver& driver,

@@ -225,7 +225,7 @@ class Rivals:
             np.hstack(
                 [
                     problem.sensitivities(p, gains, columns),
-                    shown(self._flexible.signals(state, at), self._flexible.targets),
+                    shown(self._flexible.signals(problem, at), self._flexible.targets),
                     *map(axle, slip),
                     shown(memory, self._remembered),
                 ]

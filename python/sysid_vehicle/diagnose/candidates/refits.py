@@ -42,7 +42,7 @@ def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
                 break
         model = fit.model.add(c.effect).with_values(values)
         try:
-            trial = refit(model, driving, fit.noise)
+            trial = refit(model, driving, fit.noise, scanned=(c.effect,))
         except (NumericalError, np.linalg.LinAlgError):
             continue
         if best is None or trial.log_likelihood > best.log_likelihood:

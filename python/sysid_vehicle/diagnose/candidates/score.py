@@ -23,14 +23,14 @@ from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect
 from ...estimate import Driving
-from ...identify import Fit
+from ...identify import Fit, longest_s
 from ...rules import USUAL, Rules
 from ..evidence.coordinates import blocks
 from ..evidence.directions import Ask, Columns, Directions
 from ..evidence.evidence import Evidence
 from ..evidence.input_noise import added_by_input_noise
 from ..evidence.projection import pseudo_inverse
-from ..evidence.sensitivity import Sensitivities, duration, sensitivities
+from ..evidence.sensitivity import Sensitivities, sensitivities
 
 _BLOCK_S, _FEWEST_BLOCKS = 0.5, 24
 _DRAWN = 1 << 22  # random numbers at once
@@ -206,7 +206,7 @@ def score_board_of(
     for *_, own in visible:
         at = slice(kept[own.start], kept[own.stop - 1] + 1)
         sizes[at, at] = np.repeat((covariance[own, own] @ S[own])[:, None], own.stop - own.start, 1)
-    seconds = duration(evidence.driving)
+    seconds = longest_s(evidence.driving)
     block_s = min(_BLOCK_S, evidence.driving.usable_s / _FEWEST_BLOCKS)
     told = projected.answer(found, Ask(None, sizes, blocks(evidence.driving, block_s)))
     ratios, chance = told.ratios[kept], told.blocks[:, kept]

@@ -16,7 +16,7 @@ from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import in_parallel
 from ...effects import Effect
-from ...estimate import Driving
+from ...identify import longest_s
 from .evidence import Evidence, Section
 
 # Gains that are high answer a delay with oscillations that grow: shorter ones are tried then.
@@ -62,7 +62,7 @@ class Sensitivities:
         out = np.empty((len(section.residual), self.width))
         model, known = self.evidence.fit.model, self.evidence.driving.force_known
         p, base = model.vector(self.candidates), model.vector()
-        seconds = duration(self.evidence.driving)
+        seconds = longest_s(self.evidence.driving)
 
         def together(few: tuple[Effect, ...]) -> None:
             columns = [i for c in few for i in c.columns]
@@ -121,7 +121,7 @@ def sensitivities(evidence: Evidence, candidates: Sequence[Effect]) -> Sensitivi
     """
     driving = evidence.driving
     possible = evidence.fit.model.seated(e for e in candidates if driving.shows(e))
-    long = duration(driving)
+    long = longest_s(driving)
     ends = np.cumsum([0, *(_width(e, long) for e in possible)])
     places = {
         e.id: slice(int(a), int(b)) for e, (a, b) in zip(possible, pairwise(ends), strict=True)
@@ -167,8 +167,3 @@ def _groups(effects: Sequence[Effect]) -> list[tuple[Effect, ...]]:
             groups.append([])
         groups[-1].append(effect)
     return [tuple(g) for g in groups if g]
-
-
-def duration(driving: Driving) -> float:
-    """Of the longest log [s]."""
-    return max(float(s.where.stop / driving.logs[s.log].rate_hz) for s in driving.stretches)

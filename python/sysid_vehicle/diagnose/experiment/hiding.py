@@ -20,9 +20,8 @@ from ..._common.threads import Workers
 from ..._common.typed import typed
 from ...effects import Effect, base_parameters
 from ...errors import InvalidInput, NumericalError
-from ...identify import Fit, explaining
+from ...identify import Fit, explaining, longest_s
 from ...vehicle import AXLES
-from ..evidence.sensitivity import duration
 from .replay import Replay
 
 _WORTH_TELLING = 0.01  # of the parameter: refits agree no better
@@ -167,7 +166,7 @@ def bias_report(
             raise InvalidInput(
                 f"the fit identifies '{e.id}' already; name effects that its model lacks"
             )
-    middle_s = 0.5 * duration(fit.driving)
+    middle_s = 0.5 * longest_s(fit.driving)
     sizes = [
         tuple(middle_s if p.scan == "time" else p.typical for p in e.parameters) for e in wanted
     ]

@@ -2,8 +2,9 @@
 
 Signals of speed, acceleration and steering, as virtual forces, moments, accelerations and sensor
 shifts, are scored together after projection on all the model can already do (a portmanteau score
-test; Lin, Biometrika 1997). Signals are built from what was known one sample earlier: the noise of
-a measurement must not enter its own prediction.
+test; Lin, Biometrika 1997). Signals are built from the motion that was foreseen a moment earlier:
+noise of a measurement must not enter its own prediction, and noise of sensors that lasts for some
+samples enters those of the next ones through the filter.
 
 No slope of a road depends on the pull. But whoever holds a speed answers slopes with the pull, and
 may know the speed better than its sensor does: what the pull then tells of slopes is no evidence,
@@ -38,6 +39,7 @@ LEAST_LEFT = 1e-3
 _TARGETS = {**FORCES, "dv_x/dt": 3, "dv_y/dt": 4, **READINGS}
 
 _FORWARD, _SIDEWAYS, _TURNING = ("vx_mps", "ax_mps2"), ("vy_mps", "ay_mps2"), ("yaw_rate_radps",)
+_FORESEEN_S = 0.2  # what of the noise of a sensor lasts longer is in no noise model a sensor's
 _SLOPE, _PULL = "dv_x/dt", 3  # the acceleration that no accelerometer feels, and its signal
 
 _MOVES = {
@@ -245,21 +247,34 @@ class Unknown:
 
     def of(self, section: Section) -> FloatArray:
         """Sensitivities of a section's residuals."""
-        fit = self.evidence.fit
-        p, noise = fit.model.vector(), fit.noise.vector()
+        p = self.evidence.fit.model.vector()
 
         def work(problem: _core.Problem, gains: Any, at: slice) -> FloatArray:
-            state = problem.trace(p, noise, False)["state"]
-            return problem.signal_sensitivities(p, gains, self.signals(state, at), self.targets)
+            return problem.signal_sensitivities(p, gains, self.signals(problem, at), self.targets)
 
         return section.rows(work, "unknown")
 
-    def signals(self, state: FloatArray, at: slice) -> FloatArray:
-        """Signals as columns, from the filter's states at some samples."""
+    def foreseen(self, problem: _core.Problem) -> tuple[FloatArray, FloatArray]:
+        """Speed and yaw rate as the filter foresaw them; where it had just begun, as it has them.
+
+        Each prediction is read as long as the next one has not got so far.
+        """
+        fit, driving = self.evidence.fit, self.evidence.driving
+        p, noise = fit.model.vector(), fit.noise.vector()
+        least = max(round(_FORESEEN_S * driving.mean_rate_hz), 1)
+        asked = [(least + i, least) for i in range(least)]
+        state = problem.trace(p, noise, False)["state"][:, [0, 2]]
+        ahead = problem.look_ahead(p, noise, asked, True)[:, :, [0, 2]]
+        known = np.isfinite(ahead)
+        motion = np.where(known.any(0), np.where(known, ahead, 0.0).sum(0), state)
+        return as_float64(motion[:, 0]), as_float64(motion[:, 1])
+
+    def signals(self, problem: _core.Problem, at: slice) -> FloatArray:
+        """Signals of some samples as columns."""
         every = begins(self.evidence.driving)
         # The first sample of a stretch knows nothing.
         first = np.union1d([0], every[(every > at.start) & (every < at.stop)] - at.start)
-        v, r = state[:, 0], state[:, 2]
+        v, r = self.foreseen(problem)
         a = v * r / GRAVITY_MPS2
         pull = self._pull[at] / self._pull_std
         w = v / 20.0

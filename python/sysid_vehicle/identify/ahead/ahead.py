@@ -271,9 +271,8 @@ def _blind_noise(driving: Driving, noise: NoiseModel) -> FloatArray:
     motion = np.maximum(spread**2 - sensor**2, 0.0)
     spread = np.sqrt(motion + (sensor / _ERRS) ** 2)
     spread[~(spread > 0.0)] = 1.0
-    return as_float64(
-        [*(_BLIND * spread), *(_STILL,) * 3, 0.0, 0.0, 0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 5.0]
-    )
+    still, none, sensors = (_STILL,) * 3, (0.0,) * 3, tuple(map(float, _BLIND * spread))
+    return NoiseModel(sensors, still, none, (0.1,) * 3).vector()
 
 
 @lru_cache

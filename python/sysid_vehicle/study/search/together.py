@@ -248,7 +248,7 @@ def _from_within(bare: Model, foretold: Mapping[str, float], contained: Fit) -> 
     for sizes in (foretold,) if any(map(_several_lags, new)) else (foretold, {}):
         with suppress(NumericalError, np.linalg.LinAlgError):
             model = bare.with_values({**sizes, **there})
-            ends.append(refit(model, contained.driving, contained.noise))
+            ends.append(refit(model, contained.driving, contained.noise, scanned=new))
             if ends[-1].log_likelihood >= contained.log_likelihood:
                 break
     return max(ends, key=_height, default=None)
