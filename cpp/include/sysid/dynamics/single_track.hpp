@@ -308,7 +308,7 @@ struct SingleTrackOf {
     }
 
     // With the downforce and the grip of effects the front lateral force is another one, and so is
-    // a_x: (1) and (5) are solved once more. Grip stays that at the loads before, of which it
+    // a_x: (1) and (5) are solved once more. Grip stays that at the loads before, on which it
     // hardly depends.
     template <class T, class S>
     static void settle_loads(Workings<S>& w, const S& mu_f, const S& at_first) {
