@@ -23,4 +23,17 @@ struct Pair {
     }
 };
 
+/// Loads of the axles without what the acceleration moves between them: m a_x h/L, eq. (5).
+inline Axles<double> rest(const Evaluation& at) {
+    const VehicleData car = saloon();
+    const double moved = car.cg_height_m / (car.lf_m + car.lr_m) * car.mass_kg * at.w.a_x;
+    return {at.w.fz_f + moved, at.w.fz_r - moved};
+}
+
+/// Lateral force per load with the effect, over that without it.
+inline Axles<double> per_load(const Pair& it) {
+    return {it.on.w.fy_f / it.on.w.fz_f * it.off.w.fz_f / it.off.w.fy_f,
+            it.on.w.fy_r / it.on.w.fz_r * it.off.w.fz_r / it.off.w.fy_r};
+}
+
 }  // namespace sysid::test

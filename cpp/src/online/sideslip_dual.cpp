@@ -135,7 +135,7 @@ const SideslipEstimate& SideslipDual::step(double dt, const SensorSample& sample
             for (TyreObserver& one : tyres_)
                 if (one.lost()) one.start(dt, s, input_);
         }
-        report();
+        report(sample);
         if (again || watch_.refused()) out_.mode = ObserverMode::kCoasting;
     }
     ++index_;
@@ -143,6 +143,11 @@ const SideslipEstimate& SideslipDual::step(double dt, const SensorSample& sample
 }
 
 void SideslipDual::run(double dt, const SensorSample& s) {
+    if (watch_.steer_lost() != steer_lost_) {
+        steer_lost_ = !steer_lost_;
+        for (TyreObserver& one : tyres_) steer_lost_ ? one.steer_lost() : one.steer_found();
+        if (!steer_lost_) input_.steer = input_.steer_slow = s.steer_rad;  // turned meanwhile
+    }
     const double steer = input_.steer, vx = input_.vx;
     in_short_steps(dt, [&](double part, double share) {
         if (share < 1.0) {
@@ -192,7 +197,8 @@ void SideslipDual::run_tyres(double dt, const SensorSample& s) {
     u.ax = (a[ForceModel::kFx] - std::sin(u.steer) * a[ForceModel::kFyf]) / car_.data.mass_kg;
     u.vx = std::max(std::isnan(s.vx_mps) ? u.vx_before + dt * u.ax : s.vx_mps, kSlowestMps);
     u.loads = axle_forces(car_, u.ax, u.vx);
-    u.slip_f_walk = watch_.steer_gap_s() > 0.0 ? kSteerUnknown : 0.0;
+    u.slip_f_walk = watch_.steer_gap_s() > 0.0 && !steer_lost_ ? kSteerUnknown : 0.0;
+    u.steer_walk = steer_lost_ ? kSteerUnknown : 0.0;
     const double keep = std::exp(-dt / kWeightTimeS);
     for (std::size_t i = 0; i < kMembers; ++i) {
         tyres_[i].step(u, s);
@@ -274,7 +280,7 @@ void SideslipDual::run_forces(double dt, const SensorSample& s) {
     forces_.step(u, Vec<4>(s.vx_mps, used[0], s.ax_mps2, used[1]));
 }
 
-void SideslipDual::report() {
+void SideslipDual::report(const SensorSample& s) {
     const auto& a = forces_.state();
     const Filter<TyreModel>& b = tyres_[likeliest()].filter();
     const double weight = car_.data.mass_kg * kGravity / car_.wheelbase_m();
@@ -300,7 +306,8 @@ void SideslipDual::report() {
     out_.nis = b.nis();
     out_.observed = b.state().update.observed;
     out_.log_likelihood = LogDensity::of(b.state().update);
-    out_.mode = b.used().hasNaN() ? ObserverMode::kCoasting : ObserverMode::kRunning;
+    const bool whole = !b.used().hasNaN() && !std::isnan(s.steer_rad + s.vx_mps + s.ax_mps2);
+    out_.mode = whole ? ObserverMode::kRunning : ObserverMode::kCoasting;
 }
 
 }  // namespace sysid

@@ -6,6 +6,7 @@ namespace {
 
 constexpr double kSharingTime_s = 0.1;
 constexpr double kBlindBraking_mps2 = 5.0;  // how fast a speed may change that is not measured
+constexpr double kBlindSteering_s = 0.1;    // for how long an angle that is not read errs alike
 
 }  // namespace
 
@@ -68,7 +69,11 @@ void SideslipModel::observe(const Input& u, const S* x, S* y) const {
 Mat<3, 3> SideslipModel::process_noise(const Input& u) const {
     const double beta = settings.beta_walk_radps, rate = u.yaw_rate_std;
     const double fx = settings.fx_walk * car.data.mass_kg * kGravity;
-    return Vec<3>(u.dt * beta * beta + u.dt * u.dt * rate * rate, u.dt * fx * fx, u.dt * fx * fx)
+    const Axles<double> rest = static_loads(kGravity, car.data.lf_m, car.data.lr_m);  // per mass
+    const double by_steer = car.front.slope() * rest.front / u.vx * u.steer_std;
+    const double lasting = 2.0 * kBlindSteering_s * u.dt;
+    return Vec<3>(u.dt * beta * beta + u.dt * u.dt * rate * rate + lasting * by_steer * by_steer,
+                  u.dt * fx * fx, u.dt * fx * fx)
         .asDiagonal();
 }
 
@@ -79,7 +84,7 @@ Mat<2, 2> SideslipModel::measurement_noise(const Input& u) const {
     const double by_rate = (c_f * car.data.lf_m - c_r * car.data.lr_m) / u.vx * u.yaw_rate_std;
     const double by_steer = c_f * u.steer_std;
     const double ay = settings.ay_mps2, model = settings.model_ay_mps2;
-    return Vec<2>(settings.ax_mps2 * settings.ax_mps2,
+    return Vec<2>(u.ax_std * u.ax_std,
                   ay * ay + model * model + by_rate * by_rate + by_steer * by_steer)
         .asDiagonal();
 }
@@ -98,23 +103,29 @@ template <Method method>
 const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample& sample) {
     const SensorSample s = watch_.look(dt, sample, index_);
     ++index_;
-    if (!watch_.fast_enough(s.vx_mps)) {
+    if (!watch_.fast_enough(std::isnan(s.vx_mps) && started_ ? input_.vx : s.vx_mps)) {
         started_ = false;
         out_ = rolling_without_slip(car_.data.lf_m, car_.data.lr_m, s);
         return out_;
     }
     rate_gap_s_ = std::isnan(s.yaw_rate_radps) ? rate_gap_s_ + dt : 0.0;
+    const bool speed_before = speed_gap_s_ == 0.0;
     speed_gap_s_ = std::isnan(s.vx_mps) ? speed_gap_s_ + dt : 0.0;
     const bool fresh = !started_ || dt > kForgottenAfterS;
     if (fresh) start(s);
     // What is known at the ends of a long step is taken to change evenly between them.
     SensorSample now = s;
-    if (speed_gap_s_ > 0.0) now.vx_mps = input_.vx;
+    if (speed_gap_s_ > 0.0) now.vx_mps = fresh ? input_.vx : blind_speed(dt, s);
     now.vx_mps = std::max(now.vx_mps, kSlowestMps);
     if (rate_gap_s_ > 0.0)
         now.yaw_rate_radps =
             std::isnan(s.ay_mps2) ? input_.yaw_rate : s.ay_mps2 / now.vx_mps;  // a steady corner
     const SideslipModel::Input before = input_;
+    input_.ax_std = settings_.ax_mps2;
+    if (std::isnan(s.ax_mps2) && speed_before && speed_gap_s_ == 0.0 && !fresh) {
+        now.ax_mps2 = slowing(dt, now);
+        input_.ax_std = std::hypot(input_.ax_std, std::sqrt(2.0) * settings_.vx_mps / dt);
+    }
     in_short_steps(fresh ? std::min(dt, kLongestStepS) : dt, [&](double part, double share) {
         SensorSample at = now;
         if (share < 1.0) {
@@ -127,9 +138,25 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
     });
     const bool again = lost();
     if (again) start(s);
-    report(s);
+    report(sample);
     if (again || watch_.refused()) out_.mode = ObserverMode::kCoasting;
     return out_;
+}
+
+/// The speed where it is not read, by the accelerometer or, without it, by the wheel force.
+template <Method method>
+double SideslipUkf<method>::blind_speed(double dt, const SensorSample& s) const {
+    const Vec<3>& x = filter_.state().mean;
+    const double ax = std::isnan(s.ax_mps2) ? (x[1] + x[2]) / car_.data.mass_kg : s.ax_mps2;
+    return input_.vx + dt * (ax + input_.vx * std::tan(x[0]) * input_.yaw_rate);
+}
+
+/// What an accelerometer along the car would read by the speeds. Without any reading the wheel
+/// force walks to where it takes all grip.
+template <Method method>
+double SideslipUkf<method>::slowing(double dt, const SensorSample& now) const {
+    const double across = now.vx_mps * std::tan(filter_.state().mean[0]);
+    return (now.vx_mps - input_.vx) / dt - across * now.yaw_rate_radps;
 }
 
 template <Method method>
@@ -204,7 +231,8 @@ void SideslipUkf<method>::report(const SensorSample& s) {
     out_.nis = filter_.nis();
     out_.observed = now.update.observed;
     out_.log_likelihood = LogDensity::of(now.update);
-    const bool whole = now.update.observed == 2 && rate_gap_s_ == 0.0 && !std::isnan(s.vx_mps);
+    const bool whole = now.update.observed == 2 && rate_gap_s_ == 0.0 &&
+                       !std::isnan(s.steer_rad + s.vx_mps + s.ax_mps2);
     out_.mode = whole ? ObserverMode::kRunning : ObserverMode::kCoasting;
 }
 

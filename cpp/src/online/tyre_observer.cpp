@@ -111,7 +111,8 @@ Mat<TyreModel::kStates, TyreModel::kStates> TyreModel::process_noise(const Input
     q[kRoad] = squared(s.road_mps2) * fresh(s.road_time_s);
     q[kPush] = squared(s.push_mps2) * fresh(s.push_time_s);
     q[kTurn] = squared(s.turn_radps2) * fresh(s.push_time_s);
-    q[kSteerOff] = q[kAyBias] = q[kGyroBias] = 1e-16;
+    q[kSteerOff] = u.dt * squared(u.steer_walk) + 1e-16;
+    q[kAyBias] = q[kGyroBias] = 1e-16;
     q[kLate] = q[kAhead] = q[kInertia] = q[kRoll] = 1e-16;  // properties of the car and its sensors
     q[kErrorF] = q[kErrorR] = q[kDrive] = fresh(s.error_time_s);
     q[kLean] = 1e-10;  // it follows from the forces
@@ -190,6 +191,25 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
 void TyreObserver::adopt(const TyreObserver& other) {
     filter_.restart(other.filter_.state().mean, Mat<kN, kN>(other.filter_.state().covariance));
     contradiction_ = 1.0;
+    offset_ = other.offset_;
+    offset_variance_ = other.offset_variance_;
+}
+
+void TyreObserver::steer_lost() {
+    const auto& now = filter_.state();
+    offset_ = now.mean[TyreModel::kSteerOff];
+    offset_variance_ = now.covariance(TyreModel::kSteerOff, TyreModel::kSteerOff);
+}
+
+void TyreObserver::steer_found() {
+    Vec<kN> mean = filter_.state().mean;
+    Mat<kN, kN> P = filter_.state().covariance;
+    constexpr int i = TyreModel::kSteerOff;
+    mean[i] = offset_;
+    P.row(i).setZero();
+    P.col(i).setZero();
+    P(i, i) = offset_variance_;
+    filter_.restart(mean, P);
 }
 
 void TyreObserver::forces(double& front, double& rear) const {

@@ -15,6 +15,7 @@ from .equations import Equations, equations
 _ABOUT = (
     "Axes of ISO 8855, SI units. steer: angle of the road wheels [rad], positive to the left;",
     "force: total force of the wheels [N], brakes negative, before drag.",
+    "Forwards alone: at walking pace, at a standstill and backwards slip angles mean nothing.",
 )
 
 

@@ -16,6 +16,7 @@ from .. import _core
 from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Told
 from .._common.style import AFTER, MEASURED, axes_or_new, tidy
+from .._common.text import number
 from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
@@ -169,11 +170,13 @@ class CorneringRun(Told):
         return int(self.used.sum()) >= _ENOUGH
 
     def __str__(self) -> str:
+        front, rear = (
+            f"{number(float(value[-1]) / 1e3)} +- {number(float(std[-1]) / 1e3, 2)}"
+            for value, std in ((self.cf_npr, self.cf_std_npr), (self.cr_npr, self.cr_std_npr))
+        )
         return (
-            f"{self.log_name}: cornering stiffness front {self.cf_npr[-1] / 1e3:.1f} +- "
-            f"{self.cf_std_npr[-1] / 1e3:.1f}, rear {self.cr_npr[-1] / 1e3:.1f} +- "
-            f"{self.cr_std_npr[-1] / 1e3:.1f} kN/rad, from {int(self.used.sum())} of "
-            f"{len(self.used)} samples"
+            f"{self.log_name}: cornering stiffness front {front}, rear {rear} kN/rad, from "
+            f"{int(self.used.sum())} of {len(self.used)} samples"
         )
 
     @typed

@@ -35,8 +35,8 @@ class SideslipEstimate(NamedTuple):
 
     `cf_npr` and `cr_npr` are the cornering stiffness of the axles at their static load [N/rad],
     `mu_f` and `mu_r` the friction at the peak, with standard deviations last. `mode` is 0 while
-    running, 1 while the car is too slow, 2 while a sensor is missing or refused and the tyre model
-    stands in.
+    running, 1 while the car is too slow, 2 while a reading is missing or refused: the models stand
+    in, and a steering angle that is not read is as unknown as the driver may have made it.
     """
 
     beta_rad: float

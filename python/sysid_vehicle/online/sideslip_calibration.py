@@ -12,8 +12,8 @@ from .._common.arguments import generator
 from .._common.arrays import FloatArray
 from .._common.printed import Told
 from .._common.typed import typed
-from ..errors import InvalidInput
-from ..export import identified_vehicle
+from ..errors import InvalidInput, warn
+from ..export.vehicle_file import vehicle_and_rest
 from ..identify import Fit
 from ..log import Log, check_car
 from ..vehicle import Vehicle
@@ -190,5 +190,20 @@ def _log_density(off: FloatArray, std: FloatArray) -> float:
 
 @typed
 def fitted_vehicle(fit: Fit) -> Vehicle:
-    """The car of a fit with the tyres, and the yaw inertia, that were found."""
-    return identified_vehicle(fit.model)
+    """The car of a fit with the tyres, and the yaw inertia, that were found.
+
+    Warns
+    -----
+    SysidWarning
+        If the model has effects that no vehicle holds, which the observers then do without;
+        offsets that every log has of its own, which they look for themselves, are not told.
+    """
+    car, rest = vehicle_and_rest(fit.model)
+    own = {name.split(".")[0] for name in fit.model.offset_names}
+    left = [e for e in rest.effects if e in fit.model.effects and e not in own]
+    if left:
+        warn(
+            f"{car.name}: a vehicle has no place for effects ({', '.join(left)}): the observers "
+            f"run without them, and where these move the car much their band is too narrow"
+        )
+    return car

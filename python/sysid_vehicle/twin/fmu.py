@@ -45,7 +45,8 @@ class FMUVariables:
     force_n, moment_nm : sequence of str
         Three inputs of the FMU each that push its body; where there are none, none.
     states : sequence of str
-        Names for its continuous states, in its order; counted if left out.
+        Names for its continuous states, in its order. If left out, one that is among `outputs` has
+        its name there, others that of the FMU.
     """
 
     inputs: Mapping[str, str]
@@ -132,11 +133,20 @@ class FMUTwin:
         self._time = 0.0
         self._start()
         count = int(self._description.numberOfContinuousStates or 0)
-        names = tuple(variables.states) or tuple(f"state_{i}" for i in range(count))
+        names = tuple(variables.states) or self._names_of_states(count)
         if self.kind == "model_exchange" and len(names) != count:
             raise InvalidInput(f"{path} has {count} states but {len(names)} names were given")
         self.state_names = names if self.kind == "model_exchange" else ()
         self.capabilities = self._capabilities()
+
+    def _names_of_states(self, count: int) -> tuple[str, ...]:
+        """What the states are called: by what a channel is compared with, its start is found."""
+        given = {theirs: ours for ours, theirs in reversed(list(self._variables.outputs.items()))}
+        rates = [rate.variable.derivative for rate in self._description.derivatives]
+        theirs = [f"state_{i}" if x is None else x.name for i, x in enumerate(rates)]
+        names = tuple(given.get(name, name) for name in theirs)
+        counted = tuple(f"state_{i}" for i in range(count))
+        return names if len(set(names)) == len(names) == count else counted
 
     @property
     def _fmu(self) -> Any:

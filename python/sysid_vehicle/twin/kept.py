@@ -9,6 +9,7 @@ from .drives import INPUTS
 _TORQUES = INPUTS[2:10]
 _FORCES = ("_n", "_nm")  # how the names of forces and torques end
 _FEEL_SPEED = ("ax_mps2", "ay_mps2")  # by drag, and in bends
+_IN_BENDS = ("ay_mps2", "vy_mps", "yaw_rate_radps")
 
 
 def kept_state(channel: str) -> str:
@@ -17,6 +18,11 @@ def kept_state(channel: str) -> str:
         return "vx_mps"  # wheels roll
     forgets = channel == "vy_mps" or channel.endswith("_rate_radps")
     return "" if forgets else channel
+
+
+def shows_speed(channel: str) -> bool:
+    """Whether a channel is off by about as much as the speed of a twin is."""
+    return kept_state(channel) == "vx_mps" or channel in _IN_BENDS
 
 
 def kept_states(channels: Iterable[str]) -> list[str]:

@@ -241,7 +241,8 @@ class SideBySide:
         guess left in it; either would pass for another mass. So where such a state is compared its
         start is looked for too, and that of ``vx_mps`` where an acceleration is; that costs one
         twin more. Angular rates and ``vy_mps``, which tyres hold, forget their start within a
-        second: they have none. Zero: the twin starts exactly where the car does.
+        second: they have none. Zero: the twin starts exactly where the car does, and with a first
+        guess that is nearly right, as the steps to others leave something in the speed.
 
     Raises
     ------

@@ -25,7 +25,7 @@ from ..errors import InvalidInput, warn
 from .car import LOAD_NAMES
 from .checks import check_heard, checked_rows, checked_step, checked_stride
 from .failing import all_numbers, blamed_on, check_repeats, check_start
-from .kept import kept_state
+from .kept import kept_state, kept_states, shows_speed
 from .observer import Observation, Observer, judged
 from .residuals import Shown
 
@@ -305,14 +305,26 @@ def _say_if_exact(twin: Twin, observer: Observer) -> None:
 
 def _left_behind(twin: Twin, observer: Observer) -> list[str]:
     """Compared channels whose state keeps what earlier guesses did to it, as nothing sets it."""
-    if observer.batch is None or "state" in twin.capabilities:
+    batch = observer.batch
+    if batch is None or "vx_mps" in observer.corrected:
         return []
-    return [
-        f"{channel}: the twin's speed cannot be set and keeps what earlier guesses did to it; "
-        f"compare ax_mps2 instead, correct vx_mps by a gain, or give the twin 'state'"
-        for channel in observer.batch.channels
-        if kept_state(channel) == "vx_mps" and "vx_mps" not in observer.corrected
-    ]
+    if "state" not in twin.capabilities:
+        # Of guesses at inertias little is left in the speed.
+        of_mass = any(u.parameter == "mass_kg" for u in batch.unknowns)
+        return [
+            f"{channel}: the twin's speed cannot be set and keeps what earlier guesses did to it; "
+            f"compare ax_mps2 alone, correct vx_mps by a gain, or give the twin 'state'"
+            for channel in batch.channels
+            if kept_state(channel) == "vx_mps" or (of_mass and shows_speed(channel))
+        ]
+    asked = batch.start_std > 0.0 and "vx_mps" in kept_states(batch.channels)
+    if not asked or "vx_mps" in twin.state_names:
+        return []
+    text = (
+        f"the start of the twin's speed is not looked for, as none of its states "
+        f"({', '.join(twin.state_names)}) is named vx_mps; name the one that is the speed so"
+    )
+    return [text]
 
 
 def _settable(twin: Twin) -> tuple[str, ...]:

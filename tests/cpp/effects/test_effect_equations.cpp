@@ -19,10 +19,25 @@ TEST(EffectEquation, RollingResistance) {
 TEST(EffectEquation, AeroDownforce) {
     const Pair it("aero_downforce", {0.9, 1.3}, kCornering, kBraking);
     const double pressure = 0.5 * 1.225 * 25.0 * 25.0;
-    EXPECT_NEAR(it.on.w.fz_f - it.off.w.fz_f, 0.9 * pressure, 1e-9);
-    EXPECT_NEAR(it.on.w.fz_r - it.off.w.fz_r, 1.3 * pressure, 1e-9);
+    EXPECT_NEAR(rest(it.on).front - rest(it.off).front, 0.9 * pressure, 1e-9);
+    EXPECT_NEAR(rest(it.on).rear - rest(it.off).rear, 1.3 * pressure, 1e-9);
     // At the same slip angle the lateral force grows with the load.
     EXPECT_NEAR(it.on.w.fy_f / it.off.w.fy_f, it.on.w.fz_f / it.off.w.fz_f, 1e-12);
+}
+
+TEST(EffectEquation, LoadsFollowTheAccelerationThatEffectsLeave) {
+    // By eq. (5), with downforce and less grip as without; a_x was that of a car without them.
+    for (const Input& u : {kBraking, kDriving}) {
+        Parameters p = plain_parameters();
+        p[parameter_of("aero_downforce", 0)] = 4.0;
+        p[parameter_of("aero_downforce", 1)] = 3.0;
+        p[parameter_of("friction_change", 0)] = 0.4;
+        const auto it =
+            evaluate({saloon(), mask_of({"aero_downforce", "friction_change"})}, kCornering, u, p);
+        const double weight = 1500.0 * kGravity, pressure = 0.5 * 1.225 * 25.0 * 25.0;
+        EXPECT_NEAR(rest(it).front, weight * 1.5 / 2.7 + 4.0 * pressure, 1e-9);
+        EXPECT_NEAR(rest(it).rear, weight * 1.2 / 2.7 + 3.0 * pressure, 1e-9);
+    }
 }
 
 TEST(EffectEquation, TyreLoadSensitivity) {
@@ -31,23 +46,23 @@ TEST(EffectEquation, TyreLoadSensitivity) {
     const double front = it.off.w.fz_f / (weight * 1.5 / 2.7);
     const double rear = it.off.w.fz_r / (weight * 1.2 / 2.7);
     ASSERT_GT(front, 1.02);
-    EXPECT_NEAR(it.on.w.fy_f / it.off.w.fy_f, 1.0 - 0.25 * (front - 1.0), 1e-12);
-    EXPECT_NEAR(it.on.w.fy_r / it.off.w.fy_r, 1.0 - 0.25 * (rear - 1.0), 1e-12);
+    EXPECT_NEAR(per_load(it).front, 1.0 - 0.25 * (front - 1.0), 1e-12);
+    EXPECT_NEAR(per_load(it).rear, 1.0 - 0.25 * (rear - 1.0), 1e-12);
 }
 
 TEST(EffectEquation, LateralLoadTransfer) {
     const Pair it("lateral_load_transfer", {0.08, 0.05}, kCornering, kDriving);
     const double in_g = 25.0 * 0.35 / kGravity;
-    EXPECT_NEAR(it.on.w.fy_f / it.off.w.fy_f, 1.0 - 0.08 * in_g * in_g, 1e-12);
-    EXPECT_NEAR(it.on.w.fy_r / it.off.w.fy_r, 1.0 - 0.05 * in_g * in_g, 1e-12);
+    EXPECT_NEAR(per_load(it).front, 1.0 - 0.08 * in_g * in_g, 1e-12);
+    EXPECT_NEAR(per_load(it).rear, 1.0 - 0.05 * in_g * in_g, 1e-12);
 }
 
 TEST(EffectEquation, CombinedSlip) {
     const Pair it("combined_slip", {0.8}, kCornering, kBraking);
     const double front = 0.6 * 4000.0 / (1.0 * it.off.w.fz_f);
     const double rear = 0.4 * 4000.0 / (1.1 * it.off.w.fz_r);
-    EXPECT_NEAR(it.on.w.fy_f / it.off.w.fy_f, std::sqrt(1.0 - 0.8 * front * front), 1e-12);
-    EXPECT_NEAR(it.on.w.fy_r / it.off.w.fy_r, std::sqrt(1.0 - 0.8 * rear * rear), 1e-12);
+    EXPECT_NEAR(per_load(it).front, std::sqrt(1.0 - 0.8 * front * front), 1e-12);
+    EXPECT_NEAR(per_load(it).rear, std::sqrt(1.0 - 0.8 * rear * rear), 1e-12);
 }
 
 TEST(EffectEquation, CombinedSlipKeepsAFifthOfALockedAxle) {
@@ -59,8 +74,9 @@ TEST(EffectEquation, CombinedSlipKeepsAFifthOfALockedAxle) {
 TEST(EffectEquation, RoadBank) {
     const Pair it("road_bank", {0.05}, kCornering, kDriving);
     const double factor = std::cos(0.05) + 25.0 * 0.35 / kGravity * std::sin(0.05);
-    EXPECT_NEAR(it.on.w.fz_f / it.off.w.fz_f, factor, 1e-12);
-    EXPECT_NEAR(it.on.w.fz_r / it.off.w.fz_r, factor, 1e-12);
+    const double moved = it.off.w.fz_r - rest(it.off).rear;
+    EXPECT_NEAR(rest(it.on).front, factor * it.off.w.fz_f + moved, 1e-9);
+    EXPECT_NEAR(rest(it.on).rear, factor * it.off.w.fz_r - moved, 1e-9);
     // Gravity moves the car and no accelerometer feels it.
     EXPECT_NEAR(it.on.rate[1], it.on.y[kAy] - 25.0 * 0.35 + kGravity * std::sin(0.05), 1e-12);
     const Pair straight("road_bank", {0.05}, {25.0}, {});

@@ -29,8 +29,8 @@ TEST(EffectEquation, FrictionChange) {
         Input u = kDriving;
         u.time_s = time;
         const Pair it("friction_change", {0.2, 5.0}, kCornering, u);
-        EXPECT_NEAR(it.on.w.fy_f / it.off.w.fy_f, left, 1e-10);
-        EXPECT_NEAR(it.on.w.fy_r / it.off.w.fy_r, left, 1e-10);
+        EXPECT_NEAR(per_load(it).front, left, 1e-10);
+        EXPECT_NEAR(per_load(it).rear, left, 1e-10);
         EXPECT_NEAR(it.on.w.mu_peak_r / it.off.w.mu_peak_r, left, 1e-10);
     }
     Input u = kDriving;
@@ -44,8 +44,8 @@ TEST(EffectEquation, TyreTemperature) {
     x[state_of("tyre_temperature", 0)] = 3.0;
     x[state_of("tyre_temperature", 1)] = 5.0;
     const Pair it("tyre_temperature", {0.03, 20.0}, x, kDriving);
-    EXPECT_NEAR(it.on.w.fy_f / it.off.w.fy_f, 1.0 - 0.03 * 3.0, 1e-12);
-    EXPECT_NEAR(it.on.w.fy_r / it.off.w.fy_r, 1.0 - 0.03 * 5.0, 1e-12);
+    EXPECT_NEAR(per_load(it).front, 1.0 - 0.03 * 3.0, 1e-12);
+    EXPECT_NEAR(per_load(it).rear, 1.0 - 0.03 * 5.0, 1e-12);
     const double front = 1e-3 * 25.0 * std::abs(it.on.w.fy_f * it.on.w.alpha_f);  // [kW]
     const double rear = 1e-3 * 25.0 * std::abs(it.on.w.fy_r * it.on.w.alpha_r);
     EXPECT_NEAR(it.on.rate[state_of("tyre_temperature", 0)], (front - 3.0) / 20.0, 1e-12);

@@ -364,6 +364,15 @@ def test_a_lag_of_no_length_is_not_what_sensors_show(truth: sv.Model) -> None:
     assert not [name for name, _, _ in found.constants if name.startswith("steer_lag")]
 
 
+def test_the_speeds_at_which_it_holds_are_told(truth: sv.Model) -> None:
+    """It gives numbers at a standstill and backwards, too, and did so with no word."""
+    said = "at a standstill and backwards slip angles mean nothing"
+    assert said in python_text(truth)
+    assert said in cpp_text(truth)
+    with zipfile.ZipFile(io.BytesIO(fmu_bytes(truth))) as unit:
+        assert said in unit.read("modelDescription.xml").decode()
+
+
 def test_the_text_reads_like_the_equations(truth: sv.Model) -> None:
     text = python_text(typical(truth, *ALL))
     assert max(len(line) for line in text.partition("def derivatives")[2].splitlines()) <= 100

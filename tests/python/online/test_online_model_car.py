@@ -5,7 +5,12 @@ import pytest
 from model_cars import car, drives
 
 import sysid_vehicle as sv
-from sysid_vehicle.online import SideslipObserver, SideslipSettings, estimate_sideslip
+from sysid_vehicle.online import (
+    SideslipObserver,
+    SideslipSettings,
+    cornering_stiffness,
+    estimate_sideslip,
+)
 
 
 @pytest.fixture(scope="module")
@@ -55,3 +60,11 @@ def test_small_stiffnesses_are_printed_with_their_figures() -> None:
     stiffness, std = (float(x) for x in front.split()[1:3])
     assert stiffness == pytest.approx(run.cf_npr[-1] / 1e3, rel=0.01)
     assert 0.0 < std < 0.1 * stiffness
+
+
+def test_small_stiffnesses_by_least_squares_are_printed_with_their_figures() -> None:
+    """They were "0.1 +- 0.0 kN/rad"."""
+    run = cornering_stiffness(car(), drives(sv.Model(car()), 635)[0])
+    printed = str(run).partition("front ")[2].split()
+    assert float(printed[0]) == pytest.approx(run.cf_npr[-1] / 1e3, rel=0.01)
+    assert float(printed[2].rstrip(",")) == pytest.approx(run.cf_std_npr[-1] / 1e3, rel=0.05)

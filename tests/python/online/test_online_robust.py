@@ -137,6 +137,71 @@ def test_copies_of_the_other_estimators_go_on_too(vehicle, copied):
     assert np.array_equal(twin.covariance, friction.covariance)
 
 
+@pytest.mark.parametrize("kind", ["dual", "ukf"])
+@pytest.mark.parametrize("seed", [950201, 950202])
+def test_the_band_holds_while_the_steering_is_not_read_and_afterwards(vehicle, kind, seed):
+    """The angle was held as if read: bands held 0.3 of it, and 0.5 for ten seconds after."""
+    drive = sv.drive(sv.Model(vehicle), sv.manoeuvres.handling_course(12.0), seed=seed)
+    readings = np.column_stack([drive[name] for name in SENSORS])
+    moving = np.abs(drive["ay_mps2"]) > 2.0
+    first = int(np.flatnonzero(moving)[len(moving[moving]) // 3])
+    gap = slice(first, first + round(1.5 * drive.rate_hz))
+    readings[gap, 0] = np.nan
+    found = SideslipObserver(vehicle, kind=kind).run(np.full(drive.n, 1 / drive.rate_hz), readings)
+    error = found[:, 0] - np.arctan2(drive["vy_mps"], drive["vx_mps"])
+    noise = 0.03 / drive["vx_mps"]  # of the lateral speed that it is judged by
+    held = np.abs(error) < 2.0 * np.hypot(found[:, 1], noise)
+    assert np.mean(held[gap]) > 0.85
+    assert np.mean(held[gap.stop :]) > 0.9
+    assert (found[gap, MODE] == 2).all()
+    assert (found[gap.stop :, MODE] == 0).all()
+
+
+@pytest.mark.parametrize("kind", ["ukf", "square-root-ukf"])
+def test_without_its_accelerometer_speeds_tell_the_wheel_force(vehicle, kind):
+    """It walked until it took all grip: 6 deg rms in place of 0.08."""
+    drive = sv.drive(sv.Model(vehicle), sv.manoeuvres.handling_course(20.0), seed=950204)
+    dt, second = np.full(drive.n, 1.0 / drive.rate_hz), round(drive.rate_hz)
+    whole = np.column_stack([drive[name] for name in SENSORS])
+    blind = np.where(np.array(SENSORS) == "ax_mps2", np.nan, whole)
+
+    def run(readings: np.ndarray) -> tuple[np.ndarray, float]:
+        found = SideslipObserver(vehicle, kind=kind).run(dt, readings)
+        error = found[:, 0] - np.arctan2(drive["vy_mps"], drive["vx_mps"])
+        means = np.convolve(error, np.ones(second) / second, "valid")  # of which little is noise
+        return found, float(np.sqrt(np.mean(means[second:] ** 2)))
+
+    found, error = run(blind)
+    assert error < 2.0 * run(whole)[1]
+    assert (found[:, MODE] == 2).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_speed_that_is_not_read_goes_on_by_the_acceleration(vehicle, kind):
+    """Kinds with fixed tyres held the last one while the car braked."""
+    drive = sv.drive(sv.Model(vehicle), sv.manoeuvres.lap(60.0), seed=950206)
+    readings = np.column_stack([drive[name] for name in SENSORS])
+    speed, span = drive["vx_mps"], round(2.0 * drive.rate_hz)
+    first = int(np.argmax(np.abs(speed[span:] - speed[:-span])))
+    gap = slice(first, first + span)
+    assert np.ptp(speed[gap]) > 5.0
+    readings[gap, SENSORS.index("vx_mps")] = np.nan
+    found = SideslipObserver(vehicle, kind=kind).run(np.full(drive.n, 1 / drive.rate_hz), readings)
+    vx = found[gap, SideslipEstimate._fields.index("vx_mps")]
+    assert np.sqrt(np.mean((vx - speed[gap]) ** 2)) < 0.3
+    assert (found[gap, MODE] == 2).all()
+
+
+@pytest.mark.parametrize("channel", range(5))
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_mode_says_where_a_reading_is_missing(vehicle, dt, sensors, kind, channel):
+    spoilt = sensors.copy()
+    spoilt[200:210, channel] = np.nan
+    found = SideslipObserver(vehicle, kind=kind).run(dt[:220], spoilt[:220])
+    assert (found[200:210, MODE] == 2).all()
+    assert (found[:200, MODE] == 0).all()
+
+
 def test_a_state_of_another_version_is_refused(vehicle):
     core = SideslipObserver(vehicle)._core
     state = core.__getstate__()

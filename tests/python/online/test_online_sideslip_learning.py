@@ -123,6 +123,18 @@ def test_a_fit_gives_its_car(vehicle):
     assert car.tyre_front.C == vehicle.tyre_front.C
 
 
+def test_a_car_without_what_the_fit_found_is_warned_of(vehicle):
+    """Downforce and heat of the tyres were left out with no word."""
+    found = sv.Model(vehicle).add("mass", "aero_downforce", "tyre_temperature")
+    found = found.with_values({"mass.relative_error": 0.1, "aero_downforce.cl_a_front_m2": 2.0})
+    with pytest.warns(SysidWarning, match=r"effects \(aero_downforce, tyre_temperature\): the obs"):
+        car = fitted_vehicle(SimpleNamespace(model=found))
+    assert car.mass_kg == pytest.approx(1.1 * vehicle.mass_kg)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fitted_vehicle(SimpleNamespace(model=sv.Model(vehicle).add("mass").with_nuisances()))
+
+
 def test_settings_on_trial_warn_of_nothing(vehicle, log):
     """Of tyres that are softer than told it was warned once for every run, with other figures."""
     stiff = {"B": 3.0 * vehicle.tyre_front.B}

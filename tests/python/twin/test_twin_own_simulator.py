@@ -44,7 +44,12 @@ def step(x: np.ndarray, u: np.ndarray, p: dict[str, float]) -> np.ndarray:
     return x + DT * rates(middle, u, p)
 
 
-def twin(mass: float, inertia: float, names: tuple[str, str] = ("force_n", "steer_rad")) -> Any:
+def twin(
+    mass: float,
+    inertia: float,
+    names: tuple[str, str] = ("force_n", "steer_rad"),
+    states: tuple[str, ...] = NAMES[:3],
+) -> Any:
     return CallableTwin(
         step,
         lambda x, u, p: np.array([*x, *forces(x, u, p)[:2]]),
@@ -52,7 +57,7 @@ def twin(mass: float, inertia: float, names: tuple[str, str] = ("force_n", "stee
         dt_s=DT,
         input_names=names,
         output_names=NAMES,
-        state_names=NAMES[:3],
+        state_names=states,
         parameters={"mass_kg": mass, "yaw_inertia_kgm2": inertia},
     )
 
@@ -98,6 +103,43 @@ def test_a_twin_that_begins_too_fast_finds_the_mass() -> None:
     run = found(*driven(SEEDS[0], speed=18.5), input_std=0.0)
     assert abs(away(run)) < 3.0
     assert run.spread["mass_kg"] < 0.01 * MASS_KG
+
+
+def test_a_speed_that_no_name_tells_is_warned_of() -> None:
+    """Its start was silently taken as exact."""
+    own = twin(1500.0, 2400.0, states=("u", "v", "r"))
+    with pytest.warns(SysidWarning, match=r"states \(u, v, r\) is named vx_mps"):
+        run = found(*driven(SEEDS[0], speed=18.5), own, input_std=0.0)
+    assert run.contradictions
+    assert abs(away(run)) < 1.0
+    exact = twin(1500.0, 2400.0, states=("u", "v", "r"))
+    inputs, read = driven(SEEDS[0])
+    assert not found(inputs, read, exact, input_std=0.0, start_std=0.0).contradictions
+
+
+def stateless(mass: float, inertia: float) -> Any:
+    own = twin(mass, inertia)
+    own.capabilities = frozenset({"parameters", "clone", "snapshot"})
+    return own
+
+
+def test_beside_a_speed_that_nothing_sets_what_bends_show_is_not_believed() -> None:
+    """Its mass was up to 14 standard errors away by both accelerations, with no word."""
+    inputs, read = driven(SEEDS[3])
+    mass = [Unknown("mass_kg", 250.0, 10.0, 700.0, 3000.0)]
+
+    def run(*channels: str) -> Observation:
+        noise = {name: COMPARED[name] for name in channels}
+        observer = Observer(batch=SideBySide(mass, noise, input_std=0.0))
+        return observe_with(stateless(1500.0, INERTIA_KGM2), inputs, read, observer)
+
+    along = run("ax_mps2")
+    assert not along.contradictions
+    assert abs(away(along)) < 3.0
+    for other in ("ay_mps2", "yaw_rate_radps"):
+        with pytest.warns(SysidWarning, match=rf"{other}: the twin's speed cannot be set.* alone"):
+            bent = run("ax_mps2", other)
+        assert abs(away(bent)) < 1.0
 
 
 def test_a_force_told_wrong_is_held_by_the_spread() -> None:

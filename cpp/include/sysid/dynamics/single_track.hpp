@@ -194,9 +194,12 @@ struct SingleTrackOf {
         const S mu_r = named("mu_r", magic_formula(w.alpha_r, rear_tyre(p)));
         part("axle loads");
         const Axles<S> known = axle_loads<T>(w, mu_f, u, since);
+        const S front_at_first = w.fz_f;
         each([&](auto e, const T* own, At) { return e.loads(own, w); });
         part("lateral forces of the axles");
         each([&](auto e, const T* own, At at) { return e.grip(own, w, lags.from(at).states()); });
+        if (force_known && !loads_known && (effects & kChangeAxleForces) != 0)
+            settle_loads<T>(w, mu_f, front_at_first);
         w.fy_f = (loads_known ? known.front : w.fz_f) * mu_f * w.grip_f;
         w.fy_r = (loads_known ? known.rear : w.fz_r) * mu_r * w.grip_r;
         part("forces of the car");
@@ -302,6 +305,18 @@ struct SingleTrackOf {
             told.rear += lever * (pull - since.pull);
         }
         return told;
+    }
+
+    // With the downforce and the grip of effects the front lateral force is another one, and so is
+    // a_x: (1) and (5) are solved once more. Grip stays that at the loads before, on which it
+    // hardly depends.
+    template <class T, class S>
+    static void settle_loads(Workings<S>& w, const S& mu_f, const S& at_first) {
+        const auto lever = named("lever", plain<T>(w.h) / (plain<T>(w.l_f) + plain<T>(w.l_r)));
+        const S part = named("front_drag_share", lever * (mu_f * w.sin_delta));
+        const S moved = part * (w.fz_f * w.grip_f - at_first) / (1.0 - part * w.grip_f);
+        w.fz_f += moved;
+        w.fz_r -= moved;
     }
 
     template <class S>

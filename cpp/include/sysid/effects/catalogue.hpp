@@ -99,6 +99,22 @@ constexpr EffectMask mask_reading_yaw_acceleration(std::index_sequence<I...> /*u
             ...);
 }
 
+template <class E>
+constexpr bool changes_axle_forces() {
+    using Parameters = const double*;
+    using Car = Workings<double>&;
+    using Loads = decltype(E::loads(std::declval<Parameters>(), std::declval<Car>()));
+    using Grip = decltype(E::grip(std::declval<Parameters>(), std::declval<Car>(),
+                                  std::declval<const double*>()));
+    return !std::is_same_v<Loads, Inactive> || !std::is_same_v<Grip, Inactive>;
+}
+
+template <std::size_t... I>
+constexpr EffectMask mask_changing_axle_forces(std::index_sequence<I...> /*unused*/) {
+    return ((changes_axle_forces<std::tuple_element_t<I, Catalogue>>() ? EffectMask{1} << I : 0) |
+            ...);
+}
+
 }  // namespace detail
 
 /// Where the states of effect `index` begin among those of the whole catalogue.
@@ -122,6 +138,9 @@ constexpr std::array<double, kAuxiliaryStates> effect_state_spreads() {
 }
 constexpr EffectMask kReadYawAcceleration =
     detail::mask_reading_yaw_acceleration(std::make_index_sequence<kEffectCount>{});
+/// Those at whose stage `loads` or `grip` the lateral forces of the axles change.
+constexpr EffectMask kChangeAxleForces =
+    detail::mask_changing_axle_forces(std::make_index_sequence<kEffectCount>{});
 
 namespace detail {
 

@@ -81,6 +81,8 @@ class SensorWatch {
     }
 
     double steer_gap_s() const { return steer_gap_s_; }
+    /// Whether the angle that is held is older than that of a sensor that is merely slow.
+    bool steer_lost() const { return steer_gap_s_ > kSlowestS; }
     /// Whether a reading of the last sample was refused.
     bool refused() const { return refused_; }
 
@@ -99,8 +101,9 @@ class SensorWatch {
   private:
     // A reading that jumped is believed when it has stayed for so long: the one before was wrong.
     static constexpr double kPatienceS = 0.5;
-    static constexpr double kHeldS = 0.05;  // some sensors give a new value only so often
-    static constexpr double kNoise = 8.0;   // standard deviations between two readings
+    static constexpr double kHeldS = 0.05;     // some sensors give a new value only so often
+    static constexpr double kSlowestS = 0.15;  // between two readings of such a sensor
+    static constexpr double kNoise = 8.0;      // standard deviations between two readings
 
     void drop_if_impossible(std::size_t i, double& value, double dt, double noise) {
         since_s_[i] += dt;

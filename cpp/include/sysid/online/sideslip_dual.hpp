@@ -57,7 +57,7 @@ class SideslipDual {
     void remember(Row& row) {
         row(car_, settings_);
         if constexpr (Row::kReads) *this = SideslipDual(car_, settings_);
-        row(watch_, forces_, input_, out_, index_, started_);
+        row(watch_, forces_, input_, out_, index_, started_, steer_lost_);
         for (TyreObserver& one : tyres_) row(one);
         for (std::size_t i = 0; i < kMembers; ++i) row(log_weights_[i], weights_[i], refuted_s_[i]);
     }
@@ -73,7 +73,7 @@ class SideslipDual {
     std::size_t likeliest() const;
     double mean_of(int state) const;
     double std_of(int state) const;
-    void report();
+    void report(const SensorSample& s);  // `s`: as it was given
 
     ObservedCar car_;
     ObserverSettings settings_;
@@ -85,7 +85,7 @@ class SideslipDual {
     TyreModel::Input input_;
     SideslipEstimate out_;
     std::size_t index_ = 0;
-    bool started_ = false;
+    bool started_ = false, steer_lost_ = false;
 };
 
 }  // namespace sysid

@@ -15,7 +15,7 @@ struct SideslipModel {
         double dt = 0.0, steer = 0.0, vx = 1.0, yaw_rate = 0.0;
         double steer_before = 0.0, vx_before = 1.0, yaw_rate_before = 0.0;
         double fz_f = 0.0, fz_r = 0.0;
-        double yaw_rate_std = 0.0, steer_std = 0.0;
+        double yaw_rate_std = 0.0, steer_std = 0.0, ax_std = 0.0;
     };
 
     ObservedCar car;
@@ -56,6 +56,8 @@ class SideslipUkf {
   private:
     void start(const SensorSample& s);
     void run(double dt, const SensorSample& s);
+    double blind_speed(double dt, const SensorSample& s) const;
+    double slowing(double dt, const SensorSample& now) const;
     bool lost() const;
     void report(const SensorSample& s);
 

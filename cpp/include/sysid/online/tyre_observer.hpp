@@ -32,7 +32,7 @@ struct TyreModel {  // observer B
         kLate,      // time by which the wheels turn after the steering angle that is read [s]
         kAhead,     // how far ahead of the centre of gravity the accelerometer sits [m]
         kInertia,   // logarithm of what the yaw inertia is multiplied by
-        kSteerOff,  // what the steering angle that is read lacks [rad]
+        kSteerOff,  // what the steering angle that is read, or held, lacks [rad]
         kAyBias,    // what the accelerometer reads too much [m/s2]
         kGyroBias,  // what the gyro reads too much [rad/s]
         kRoll,  // share of `kLean` that the accelerometer feels too much, by gravity in body roll
@@ -63,7 +63,8 @@ struct TyreModel {  // observer B
         double error_f_n = 0.0, error_r_n = 0.0;  // standard deviation of the tyre model's error
         double drive_nm = 0.0;                    // standard deviation of that yaw moment
         double stiffness_walk_f = 0.0, stiffness_walk_r = 0.0;  // [1/sqrt(s)]
-        double slip_f_walk = 0.0;  // of an unknown steering angle [rad/sqrt(s)]
+        double slip_f_walk = 0.0;  // of an angle that is held between two readings [rad/sqrt(s)]
+        double steer_walk = 0.0;  // of an angle that is not read, away from that held [rad/sqrt(s)]
         Keeps keeps{};
     };
 
@@ -94,6 +95,11 @@ class TyreObserver {
     void start(double dt, const SensorSample& s, const TyreModel::Input& common);
     /// Uses one sample; `common` holds the inputs that do not depend on the tyres.
     void step(const TyreModel::Input& common, const SensorSample& s);
+    /// The steering angle is no longer read: what that which is held lacks walks away from its
+    /// offset.
+    void steer_lost();
+    /// It is read again: its offset is what it was.
+    void steer_found();
     bool lost() const;
     /// Goes on with the estimate of another.
     void adopt(const TyreObserver& other);
@@ -107,7 +113,7 @@ class TyreObserver {
 
     template <class Row>
     void remember(Row& row) {
-        row(filter_, input_, contradiction_, log_likelihood_);
+        row(filter_, input_, contradiction_, log_likelihood_, offset_, offset_variance_);
     }
 
   private:
@@ -120,7 +126,8 @@ class TyreObserver {
     TyreModel::Input input_;
     double contradiction_ = 1.0;  // squared innovations over their variance, of the last while
     double log_likelihood_ = 0.0;
-    double refusal_ = 0.0;  // what a refused reading takes from it
+    double refusal_ = 0.0;                         // what a refused reading takes from it
+    double offset_ = 0.0, offset_variance_ = 0.0;  // of the steering, before it was lost
 };
 
 }  // namespace sysid
