@@ -55,6 +55,8 @@ class Competition:
     causes : Causes
     alone : tuple of str
         What may have changed by itself, the likeliest first.
+    beside_put : dict of str to float
+        Log-odds of what may have changed together with what was put in, against that alone.
     """
 
     def __init__(
@@ -322,9 +324,9 @@ class Competition:
             self._ratio,
             self._rules.nothing,
         )
-        known = replace(
-            model, hypotheses=tuple(h for h in self._hypotheses if not h.name.startswith(UNKNOWN))
-        )
+        named = (h for h in self._hypotheses if not h.name.startswith(UNKNOWN))
+        known = replace(model, hypotheses=tuple(named))
+        self.beside_put = known.beside(self.put) if self.put else {}
         alone = tuple(e for s in known.subsets(1) for e in s.effects)
         parameters = {m.id: m.parameters for m in self._may}
         return causes_in(model, known, scale, parameters, self._rules, most=_MOST), alone

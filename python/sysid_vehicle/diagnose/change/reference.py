@@ -94,7 +94,11 @@ class Reference:
         Their columns, and those of clocks.
     shared : Shared
         Effects that the model lacks are about as large as usual, or nothing.
+    nothing : Exact
+        Both drivings without a change, at the highest maximum that any search came to.
     """
+
+    nothing: Exact
 
     def __init__(
         self,
@@ -183,10 +187,15 @@ class Reference:
         if not put:
             model, value = self._fit(start, put, sizes, usual, own)
             model, value = self._climbed(start, model, own, [], [])
-            self._nothing, self._unchanged = value, model
-            return self._exact(start, put, sizes, model, value, climbed=True)
+            return self._without(start, model, value)
         model, value = self._fit(start, put, sizes, usual, own, also)
         return self._exact(start, put, sizes, model, value, climbed=False)
+
+    def _without(self, start: Fit, model: Model, value: float) -> Exact:
+        """Nothing changed."""
+        self._nothing, self._unchanged = value, model
+        self.nothing = self._exact(start, (), (), model, value, climbed=True)
+        return self.nothing
 
     def climbed(self, start: Fit, state: Exact) -> Exact:
         """The same at the maximum of the likelihood, as is what nothing changed.
@@ -218,7 +227,10 @@ class Reference:
             seconds = [d.usable_s for d in (self.before.driving, start.driving)]
             wanted = self._fitted[frozenset(put)][1] - self._alone
             wanted *= sum(seconds) / seconds[0]  # as much in each second of both
-            same, allowed = self._same(start, own, model, wanted, climb=climbed)
+            same, allowed, both = self._same(start, own, model, wanted, climb=climbed)
+            if {*both.effects} == {*start.model.effects} and same > self._nothing:
+                # Tyres that are in both the same are no change: searches end in several valleys.
+                self._without(start, both, same)
             reached -= max(same - self._nothing, 0.0)
             among -= max(allowed - self._nothing, 0.0)
         self._best = max(self._best, reached)
@@ -247,8 +259,8 @@ class Reference:
 
     def _same(
         self, start: Fit, own: Model, apart: Model, wanted: float, *, climb: bool
-    ) -> tuple[float, float]:
-        """Log-likelihoods of both drivings where what was put in is in both the same.
+    ) -> tuple[float, float, Model]:
+        """Log-likelihoods of both drivings where what was put in is in both the same, and where.
 
         The second one gains no more than the reference alone wants (`wanted`, of both drivings),
         where it refuses the compromise of both. Tyres that are multiplied in both are other tyres
@@ -269,7 +281,9 @@ class Reference:
             p, _, value = to_the_maximum(objective, p, noise, box)
         off = {n: float(p[apart.parameters[n].column]) - own.value(n) for n in changed}
         loss = 0.5 * self._squared(off)
-        return value, value if loss <= self._rules.told else min(value, self._nothing + wanted)
+        allowed = value if loss <= self._rules.told else min(value, self._nothing + wanted)
+        values = {n: float(p[apart.parameters[n].column]) for n in apart.free_names}
+        return value, allowed, apart.with_values(values)
 
     def _squared(self, off: Mapping[str, float]) -> float:
         """Squared standard errors of the reference by which parameters are off, all else free."""

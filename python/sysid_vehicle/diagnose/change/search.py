@@ -18,7 +18,7 @@ from ...vehicle import AXLES, GRAVITY_MPS2
 from ..candidates.clocks import CLOCKS
 from ..candidates.possible import considered
 from .beside_reference import Differences, Side
-from .both_axles import SCALINGS, factors, hold_tyres, moves, without
+from .both_axles import SCALINGS, factors, hold_tyres, moves, seated, without
 from .changes_compete import Competition
 from .may_change import (
     PAYLOAD,
@@ -33,8 +33,10 @@ from .may_change import (
 from .one_point import Lines
 from .pieces import Pieces
 from .reference import Exact, Reference
+from .rivals import beside, in_place
 
 _TRIED = 5  # of the best single changes, exactly
+_BESIDE = 2  # of what goes best with each of these
 _ROUNDS = 4  # times that scores are taken anew
 _CLOSE = 4.0  # nats of evidence, that a search may end below the maximum
 
@@ -93,20 +95,12 @@ class Search:
         clocks = [c for c in CLOCKS if c.channel != "fx_n" or start.driving.force_known]
         fitted = [m for m in several if m.id in {e.id for e in effects} or free.issuperset(m.names)]
         self.reference = Reference(before, fitted, effects, rules)
-        self._scalings = self._seated(free, [e for e in effects if e.acts])
+        users = [e for e in effects if e.acts]
+        self._scalings = seated(model, self.tyres, free, users)
         fitted += map(of_effect, self._scalings)
         self.can = {m.id: m for m in fitted}
         self.may = [*fitted, *map(of_clock, clocks)]
         self.visited: dict[frozenset[str], Exact] = {}
-
-    def _seated(self, free: set[str], users: Sequence[Effect]) -> tuple[Effect, ...]:
-        """Changes of the tyres of both axles, where these are fitted and there is room for them."""
-        if not all(free.issuperset(m.names) for m in self.tyres):
-            return ()
-        with suppress(InvalidInput):
-            self.start.model.add(*users, *SCALINGS)
-            return SCALINGS
-        return ()
 
     @cached_property
     def singles(self) -> Competition:
@@ -125,6 +119,7 @@ class Search:
     def found(self) -> tuple[Competition, Exact]:
         """What competes where the changes that explain most have been put in, and these."""
         told = self.singles
+        self._in_twos()
         state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
         seen: set[tuple[str, ...]] = set()
         for _ in range(_ROUNDS):
@@ -132,7 +127,7 @@ class Search:
             seen.add(state.put)
             self._visit(self._leading(told, state), told)
             for effect in state.put:
-                for rival in self._rivals(effect, told):
+                for rival in in_place(effect, told, self.can):
                     self._visit(_instead(state.put, effect, rival), told)
             best, state = self._best(told, state), self.visited[frozenset(state.put)]
             if best is state:
@@ -141,6 +136,17 @@ class Search:
                 break
             state = best
         return self._settled(told, state)
+
+    def _in_twos(self) -> None:
+        """Of each change that was fitted alone, that together with what lines name beside it."""
+        if self.nothing(self.singles) > 1.0 - self.rules.credible:
+            return
+        for state in [s for s in self.visited.values() if s.put]:
+            with suppress(InvalidInput):  # tyres that are multiplied may be beyond any
+                told = self.told(state)
+                for more in beside(told, self.can, self.rules)[:_BESIDE]:
+                    begin = dict.fromkeys(self.can[more].names, 0.0) | state.changes
+                    self._visit((*state.put, more), told, (begin,))
 
     def _settled(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
         """What will be named has been put in, and not a rival of it: sizes are told beside it."""
@@ -173,6 +179,7 @@ class Search:
         if not state.climbed:
             with suppress(NumericalError, np.linalg.LinAlgError):
                 self.visited[frozenset(state.put)] = self.reference.climbed(self.start, state)
+                self.visited[frozenset()] = self.reference.nothing
         return self.visited[frozenset(state.put)]
 
     def _shown(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
@@ -280,16 +287,6 @@ class Search:
                 odds[rival] = 0.5 * (w - v) / ratio + next(prices) - next(prices)
         return odds
 
-    def _rivals(self, effect: str, told: Competition) -> list[str]:
-        """What may have changed in its place."""
-        own = told.causes.of(effect)
-        several = (
-            *self.can[effect].rivals,
-            *(e for e, m in self.can.items() if effect in m.rivals),
-            *(() if own is None else own.effects),
-        )
-        return [e for e in dict.fromkeys(several) if e in self.can and e not in told.put]
-
     def told(self, state: Exact, *, at_one_point: bool = False) -> Competition:
         """What competes beside what was put in."""
         reference, side = self.reference, self.reference.side
@@ -343,6 +340,7 @@ class Search:
             told_by_lines = {n: told.sizes[n] for n in usual}
             exact = self.reference.fitted(self.start, put, told_by_lines, usual, also)
             self.visited[frozenset(put)] = exact
+            self.visited[frozenset()] = self.reference.nothing
 
     def lacking(self, effect: str, state: Exact, group: Sequence[str]) -> list[Exact]:
         """What was fitted, to its maximum, without an effect and all of its group.

@@ -1,0 +1,36 @@
+"""What to fit in place of a change, and beside it: another name, and the other one of two.
+
+What changed together with something else is imitated by some effect that is neither: from there
+lines lead astray. From either of the two they lead to the other one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ...rules import Rules
+from ..candidates.causes import CredibleSet
+from .both_axles import by_other_names
+from .changes_compete import Competition
+from .may_change import May
+
+
+def in_place(effect: str, told: Competition, can: Mapping[str, May]) -> list[str]:
+    """What may have changed in place of an effect that was put in."""
+    own = told.causes.of(effect)
+    several = (
+        *can[effect].rivals,
+        *(e for e, m in can.items() if effect in m.rivals),
+        *(() if own is None else own.effects),
+        *by_other_names(effect, told.put),
+    )
+    return [e for e in dict.fromkeys(several) if e in can and e not in told.put]
+
+
+def beside(told: Competition, can: Mapping[str, May], rules: Rules) -> tuple[str, ...]:
+    """What may have changed together with what was put in, the likeliest first.
+
+    Whether it is worth its price is not asked: of large changes lines tell far too little.
+    """
+    log_odds = {e: x for e, x in told.beside_put.items() if e in can}
+    return CredibleSet.of(log_odds, rules.credible).effects if log_odds else ()
