@@ -38,7 +38,8 @@ def searching(
     }
     search.start = None  # type: ignore[assignment]
     search.reference = SimpleNamespace(  # type: ignore[assignment]
-        climbed=lambda _, s: SimpleNamespace(put=s.put, changes={}, climbed=True)
+        climbed=lambda _, s: SimpleNamespace(put=s.put, changes={}, climbed=True),
+        nothing=search.visited[frozenset()],
     )
     monkeypatch.setattr(search, "told", lambda state: Told(state.put, lines))
     monkeypatch.setattr(search, "_leading", lambda _, state: state.put)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -14,6 +14,7 @@ from ...errors import NumericalError
 from ...identify import Fit, lost_to_input_noise
 from ...identify.search.box import free_box
 from ...identify.search.climb import climb as to_the_maximum
+from ...identify.search.objective import Objective
 from ...model import Model
 from ...rules import USUAL, Rules
 from ..candidates.possible import OF_A_FACTOR
@@ -127,8 +128,11 @@ class Reference:
                 mean, std = model.priors[name]
                 precision[i], centre[i] = std**-2, mean - model.value(name)
         self.shared = Shared(as_float64(precision), centre)
+        self._of = {n: m.id for m in may for n in m.names}
+        self._of |= {n: e.id for e in SCALINGS for n in e.named}
         self._both = Together(before, self.place, self.shared)
         self._fitted: dict[frozenset[str], tuple[Model, float]] = {}
+        self._sharing: dict[tuple[frozenset[str], frozenset[str], bool], float] = {}
         self._nothing, self._unchanged = -np.inf, model
         self._likeliest = self._best = -np.inf  # of later driving, and less what both share
         self._alone = self._fit(before, (), {}, {})[1]
@@ -208,6 +212,25 @@ class Reference:
         model, value = self._climbed(start, state.searched, own, names, names)
         return self._exact(start, state.put, names, model, value, climbed=True)
 
+    def sharing(self, start: Fit, state: Exact, few: Collection[str]) -> float:
+        """Log-likelihood of a state in which some of what was put in is in both drivings the same.
+
+        The rest changes as in the state: what the reference refuses of that says nothing of these.
+        """
+        key = (frozenset(state.put), frozenset(few), state.climbed)
+        if key not in self._sharing:
+            own, later = self._fitted[key[0]][0], state.searched
+            alike = {n for n in state.changes if self._of[n] in few}
+            changed = [n for n in state.changes if n not in alike]
+            loose = [*changed, *alike.difference(self.before.model.free_names)]
+            objective = self._both.objective(start, later, own, loose, changed)
+            ends = [{n: m.value(n) for n in alike} for m in (own, later)]
+            ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in alike})
+            best, reached = self._followed(objective, later, ends, climb=state.climbed)
+            fit = replace(start, model=as_tyres(best))
+            self._sharing[key] = reached + lost_to_input_noise(fit, fit.driving)
+        return self._sharing[key]
+
     def _exact(
         self,
         start: Fit,
@@ -267,23 +290,34 @@ class Reference:
         of both.
         """
         own, apart = without(own), as_tyres(apart)
-        noise, box = self.before.noise.vector(), free_box(apart)
         changed = [n for n in apart.free_names if n not in self.before.model.free_names]
         objective = self._both.objective(start, apart, own, changed, [])
         ends = [{n: m.value(n) for n in apart.free_names} for m in (own, apart)]
         ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in apart.free_names})
         ends.append(ends[0] | {n: self._unchanged.value(n) for n in self._unchanged.free_names})
-        starts = [box.inside(apart.with_values(e).vector()) for e in ends]
+        both, value = self._followed(objective, apart, ends, climb=climb)
+        loss = 0.5 * self._squared({n: both.value(n) - own.value(n) for n in changed})
+        allowed = value if loss <= self._rules.told else min(value, self._nothing + wanted)
+        return value, allowed, both
+
+    def _followed(
+        self,
+        objective: Objective,
+        model: Model,
+        ends: Sequence[Mapping[str, float]],
+        *,
+        climb: bool,
+    ) -> tuple[Model, float]:
+        """Where a search from the best of some starts ends, and its log-likelihood."""
+        noise, box = self.before.noise.vector(), free_box(model)
+        starts = [box.inside(model.with_values(e).vector()) for e in ends]
         gains = objective.freeze(starts[0], noise)
         begin = min(starts, key=lambda p: cost(objective, p, gains))
         p, value = highest(objective, begin, noise, box)
         if climb:
             p, _, value = to_the_maximum(objective, p, noise, box)
-        off = {n: float(p[apart.parameters[n].column]) - own.value(n) for n in changed}
-        loss = 0.5 * self._squared(off)
-        allowed = value if loss <= self._rules.told else min(value, self._nothing + wanted)
-        values = {n: float(p[apart.parameters[n].column]) for n in apart.free_names}
-        return value, allowed, apart.with_values(values)
+        values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
+        return model.with_values(values), value
 
     def _squared(self, off: Mapping[str, float]) -> float:
         """Squared standard errors of the reference by which parameters are off, all else free."""

@@ -6,13 +6,23 @@ lines lead astray. From either of the two they lead to the other one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from ...rules import Rules
 from ..candidates.causes import CredibleSet
 from .both_axles import by_other_names
 from .changes_compete import Competition
 from .may_change import May
+
+
+def leading(told: Competition, put: Sequence[str], can: Mapping[str, May]) -> tuple[str, ...]:
+    """Of each credible set the likeliest that can be fitted, or what was, if it is like it."""
+    found = []
+    for s in told.causes.sets:
+        known = next((e for e in s.effects if e in put), "")
+        known = known or told.acts_like(s.effects[0])
+        found.append(known or next((e for e in s.effects if e in can), ""))
+    return tuple(dict.fromkeys(e for e in (*put, *found) if e))
 
 
 def in_place(effect: str, told: Competition, can: Mapping[str, May]) -> list[str]:

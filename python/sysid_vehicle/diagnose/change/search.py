@@ -33,7 +33,7 @@ from .may_change import (
 from .one_point import Lines
 from .pieces import Pieces
 from .reference import Exact, Reference
-from .rivals import beside, in_place
+from .rivals import beside, in_place, leading
 
 _TRIED = 5  # of the best single changes, exactly
 _BESIDE = 2  # of what goes best with each of these
@@ -95,8 +95,7 @@ class Search:
         clocks = [c for c in CLOCKS if c.channel != "fx_n" or start.driving.force_known]
         fitted = [m for m in several if m.id in {e.id for e in effects} or free.issuperset(m.names)]
         self.reference = Reference(before, fitted, effects, rules)
-        users = [e for e in effects if e.acts]
-        self._scalings = seated(model, self.tyres, free, users)
+        self._scalings = seated(model, self.tyres, free, [e for e in effects if e.acts])
         fitted += map(of_effect, self._scalings)
         self.can = {m.id: m for m in fitted}
         self.may = [*fitted, *map(of_clock, clocks)]
@@ -145,8 +144,8 @@ class Search:
             with suppress(InvalidInput):  # tyres that are multiplied may be beyond any
                 told = self.told(state)
                 for more in beside(told, self.can, self.rules)[:_BESIDE]:
-                    begin = dict.fromkeys(self.can[more].names, 0.0) | state.changes
-                    self._visit((*state.put, more), told, (begin,))
+                    start = dict.fromkeys(self.can[more].names, 0.0) | state.changes
+                    self._visit((*state.put, more), told, (start,))
 
     def _settled(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
         """What will be named has been put in, and not a rival of it: sizes are told beside it."""
@@ -317,13 +316,7 @@ class Search:
         )
 
     def _leading(self, told: Competition, state: Exact) -> tuple[str, ...]:
-        """Of each credible set the likeliest that can be fitted, or what was, if it is like it."""
-        found = []
-        for s in told.causes.sets:
-            known = next((e for e in s.effects if e in state.put), "")
-            known = known or told.acts_like(s.effects[0])
-            found.append(known or next((e for e in s.effects if e in self.can), ""))
-        return tuple(dict.fromkeys(e for e in (*state.put, *found) if e))
+        return leading(told, state.put, self.can)
 
     def _visit(
         self,
@@ -362,16 +355,25 @@ class Search:
     def evidence(self, state: Exact, told: Competition, ratio: float) -> float:
         """Log-likelihood over the variance ratio, less the price of the changes [nats].
 
-        Among what is likelier than nothing, and than each part of it, that by which these compare:
-        what is added and only gains as a lack of the reference does is no change.
+        Among what is likelier than nothing, and adds changes to each part of it, that by which
+        these compare: what is added and only gains as a lack of the reference does is no change.
         """
         price = told.price(state.put, state.sizes)
-        nothing = self.visited[frozenset()].reached / ratio
+        more = self.over_nothing(state, told, ratio) > 0.0 and not self._lacking_in_both(
+            state, ratio
+        )
+        return (state.among if more else state.reached) / ratio - price
+
+    def _lacking_in_both(self, state: Exact, ratio: float) -> bool:
+        """Whether some of what was put in does as well where it is in both drivings the same."""
         put = frozenset(state.put)
-        parts = [v.reached for k, v in self.visited.items() if k < put]
-        more = state.reached / ratio - price > nothing and state.reached >= max(parts)
-        told_by = state.among if more else state.reached
-        return told_by / ratio - price
+        return any(
+            state.among <= part.among
+            or state.log_likelihood - self.reference.sharing(self.start, state, put - key)
+            < self.rules.told * ratio
+            for key, part in self.visited.items()
+            if key < put and part.reached > state.reached
+        )
 
     def over_nothing(self, state: Exact, told: Competition, ratio: float) -> float:
         """By how much a state is likelier than that nothing changed [nats]."""
