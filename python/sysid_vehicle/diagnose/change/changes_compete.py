@@ -355,9 +355,12 @@ class Competition:
         columns = [c for name in put for c in self._whole[name].columns]
         scale = self._scale[columns]
         block = self._information[np.ix_(columns, columns)] * np.outer(scale, scale)
-        known = np.eye(len(columns)) + block / self.ratio_of(put)
+        block = block / self.ratio_of(put)
+        known = np.eye(len(columns)) + block
         sizes = np.array([changed_by[n] for e in put for n in self._of(e).names]) / scale
-        occam = 0.5 * float(np.linalg.slogdet(known)[1]) + 0.5 * float(sizes @ sizes)
+        # Of what no driving tells the likeliest size is any, and the prior's loses nothing.
+        far = float(sizes @ block @ np.linalg.solve(known, sizes))
+        occam = 0.5 * float(np.linalg.slogdet(known)[1]) + 0.5 * far
         return occam + len(as_one(put)) * self._of_one
 
     @property
