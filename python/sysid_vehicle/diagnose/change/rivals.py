@@ -37,6 +37,11 @@ def in_place(effect: str, told: Competition, can: Mapping[str, May]) -> list[str
     return [e for e in dict.fromkeys(several) if e in can and e not in told.put]
 
 
+def instead(put: tuple[str, ...], effect: str, rival: str) -> tuple[str, ...]:
+    """What was put in, with a rival in place of an effect."""
+    return tuple(rival if e == effect else e for e in put)
+
+
 def beside(told: Competition, can: Mapping[str, May], rules: Rules) -> tuple[str, ...]:
     """What may have changed together with what was put in, the likeliest first.
 

@@ -18,7 +18,7 @@ from ...vehicle import AXLES, GRAVITY_MPS2
 from ..candidates.clocks import CLOCKS
 from ..candidates.possible import considered
 from .beside_reference import Differences, Side
-from .both_axles import SCALINGS, factors, hold_tyres, moves, seated, without
+from .both_axles import SCALINGS, by_other_names, factors, hold_tyres, moves, seated, without
 from .changes_compete import Competition
 from .may_change import (
     PAYLOAD,
@@ -33,16 +33,12 @@ from .may_change import (
 from .one_point import Lines
 from .pieces import Pieces
 from .reference import Exact, Reference
-from .rivals import beside, in_place, leading
+from .rivals import beside, in_place, instead, leading
 
 _TRIED = 5  # of the best single changes, exactly
 _BESIDE = 2  # of what goes best with each of these
 _ROUNDS = 4  # times that scores are taken anew
 _CLOSE = 4.0  # nats of evidence, that a search may end below the maximum
-
-
-def _instead(put: tuple[str, ...], effect: str, rival: str) -> tuple[str, ...]:
-    return tuple(rival if e == effect else e for e in put)
 
 
 class Search:
@@ -87,8 +83,8 @@ class Search:
             for e in considered(model, candidates)
             if e.scanned is None and e.id in lacked and all(d.shows(e) for d in both)
         )
-        own = (e for e in model.parts if e.scanned is None and free.issuperset(e.named))
         self.tyres = tuple(of_tyre(model, a) for a in AXLES)
+        own = (e for e in model.parts if e.scanned is None and free.issuperset(e.named))
         several = [*map(of_effect, (*own, *effects)), *self.tyres]
         if YAW_INERTIA in free:
             several.append(of_inertia(model))
@@ -127,7 +123,7 @@ class Search:
             self._visit(self._leading(told, state), told)
             for effect in state.put:
                 for rival in in_place(effect, told, self.can):
-                    self._visit(_instead(state.put, effect, rival), told)
+                    self._visit(instead(state.put, effect, rival), told)
             best, state = self._best(told, state), self.visited[frozenset(state.put)]
             if best is state:
                 best = self._better(state, told)
@@ -249,7 +245,7 @@ class Search:
             odds = self.odds(effect, state, told)
             best = max(odds, key=lambda e: odds[e])
             if best != effect:
-                return self.visited[frozenset(_instead(state.put, effect, best))]
+                return self.visited[frozenset(instead(state.put, effect, best))]
         return state
 
     def odds(self, effect: str, state: Exact, told: Competition) -> dict[str, float]:
@@ -257,16 +253,20 @@ class Search:
 
         A rival is fitted together with it too, in the reference and in the later driving: which of
         the two differs tells more than which of them alone is likelier, as what the reference left
-        may speak for one of them. Of tyres no line tells it (`_off_nothing`).
+        may speak for one of them. Of tyres no line tells it (`_off_nothing`); and what changes them
+        by other names, no less likely, is no less likely for its more coefficients.
         """
         ratio, odds = told.ratio_of(state.put), {effect: 0.0}
         here, nothing = self.evidence(state, told, ratio), self.visited[frozenset()]
         least = self.rules.near * (state.reached - nothing.reached)
         for rival in self.can:
-            other = self.visited.get(frozenset(_instead(state.put, effect, rival)))
+            other = self.visited.get(frozenset(instead(state.put, effect, rival)))
             if rival in state.put or other is None:
                 continue
             odds[rival] = self.evidence(other, told, ratio) - here
+            if rival in by_other_names(effect, state.put):
+                gain = (other.log_likelihood - state.log_likelihood) / ratio
+                odds[rival] = max(odds[rival], min(gain, 0.0))
             if other.reached - nothing.reached < least:
                 continue
             both = (*state.put, rival)
