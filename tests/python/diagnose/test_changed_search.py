@@ -155,9 +155,6 @@ def test_of_two_changes_each_leads_to_the_other(monkeypatch: pytest.MonkeyPatch)
     for m in search.can.values():
         m.names = ()  # type: ignore[misc]
     tried: list[frozenset[str]] = []
-    shown = 1e-6
-    monkeypatch.setattr(search, "nothing", lambda _: shown)
-    monkeypatch.setattr(Search, "singles", None)
     monkeypatch.setattr(search, "_visit", lambda few, *_: tried.append(frozenset(few)))
     monkeypatch.setattr(
         search,
@@ -166,11 +163,6 @@ def test_of_two_changes_each_leads_to_the_other(monkeypatch: pytest.MonkeyPatch)
     )
     search._in_twos()
     assert tried == [frozenset((*imitator, "road_grade")), frozenset(one + other)]
-    # Where nothing is shown nothing more is fitted.
-    tried.clear()
-    shown = 0.5
-    search._in_twos()
-    assert tried == []
 
 
 def test_an_added_change_is_none_where_it_does_as_well_as_a_lack() -> None:

@@ -114,8 +114,11 @@ class Search:
     def found(self) -> tuple[Competition, Exact]:
         """What competes where the changes that explain most have been put in, and these."""
         told = self.singles
-        self._in_twos()
         state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
+        left = self.told(state).causes.sets if state.put else ()
+        if any({*state.put}.isdisjoint(s.effects) for s in left):
+            self._in_twos()
+            state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
         seen: set[tuple[str, ...]] = set()
         for _ in range(_ROUNDS):
             told = self.told(state)
@@ -125,8 +128,7 @@ class Search:
                 for rival in in_place(effect, told, self.can):
                     self._visit(instead(state.put, effect, rival), told)
             best, state = self._best(told, state), self.visited[frozenset(state.put)]
-            if best is state:
-                best = self._better(state, told)
+            best = self._better(state, told) if best is state else best
             if best.put in seen:
                 break
             state = best
@@ -134,8 +136,6 @@ class Search:
 
     def _in_twos(self) -> None:
         """Of each change that was fitted alone, that together with what lines name beside it."""
-        if self.nothing(self.singles) > 1.0 - self.rules.credible:
-            return
         for state in [s for s in self.visited.values() if s.put]:
             with suppress(InvalidInput):  # tyres that are multiplied may be beyond any
                 told = self.told(state)
