@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sysid_vehicle.diagnose.change.both_axles import FRICTION, STIFFNESS, by_other_names
+from sysid_vehicle.diagnose.change.both_axles import FRICTION, STIFFNESS, by_other_names, hold_tyres
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
 from sysid_vehicle.rules import USUAL
@@ -189,6 +189,13 @@ def test_an_added_change_is_none_where_it_does_as_well_as_a_lack() -> None:
     assert evidence() == 985.0
     shares["cg_position"] = 989.0
     assert evidence() == 445.0
+
+
+def test_what_changes_each_axle_does_not_speak_against_a_change_of_both() -> None:
+    front, rear = "tyre_front", "tyre_rear"
+    assert hold_tyres({front, rear, "mass"}, STIFFNESS)
+    assert not hold_tyres({front, "mass"}, STIFFNESS)
+    assert not hold_tyres({front, rear}, "mass")
 
 
 def test_tyres_have_other_names_beside_another_change_of_them() -> None:

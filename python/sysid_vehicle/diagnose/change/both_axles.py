@@ -73,13 +73,16 @@ SCALINGS = tuple(_effect(of) for of in _POWERS)
 """Effects that multiply tyres; the compiled model does not know them (`Scaled` does)."""
 
 
-def hold_tyres(put: Collection[str], axle: str) -> bool:
-    """Whether changes hold one of the tyres of an axle, `tyre_rear` say, by other names.
+def hold_tyres(put: Collection[str], effect: str) -> bool:
+    """Whether changes hold one of the tyres, `tyre_rear` say, by other names.
 
-    What changed both axles and was taken back at the other one changed this one.
+    What changed both axles and was taken back at the other one changed this one; what changed each
+    axle may have changed both.
     """
-    other = {f"tyre_{a}" for a in AXLES} - {axle}
-    return len(other) < len(AXLES) and other <= {*put} and not _POWERS.keys().isdisjoint(put)
+    axles = {f"tyre_{a}" for a in AXLES}
+    if effect in _POWERS:
+        return axles <= {*put}
+    return effect in axles and axles - {effect} <= {*put} and not _POWERS.keys().isdisjoint(put)
 
 
 def by_other_names(effect: str, put: Collection[str]) -> tuple[str, ...]:
