@@ -1,6 +1,7 @@
 """Does a comparison of two drives name what changed in the car between them, and nothing else?
 
     python benchmarks/changed [--seed 1] [--pairs 40] [--unchanged 20] [--kind KIND] [--json FILE]
+                              [--driving COURSE] [--apart]
     python benchmarks/changed --read FILE [FILE ...]
 
 Each pair is a car of its own: mass, wheelbase, place of the centre of gravity, tyres, what its
@@ -29,17 +30,20 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from counts import Row, table
-from pairs import ASKED, Pair, Truth, drawn
+from pairs import ASKED, DRIVING, Pair, Truth, drawn
 
 import sysid_vehicle as sv
 
 _SIDES = 1.959964
 
 
-def judged(pair: Pair) -> Row:
-    """What is said of one pair."""
+def judged(pair: Pair) -> Row | None:
+    """What is said of one pair; None where one of its changes is not named alone."""
     began = time.process_time()
     fit = sv.identify(pair.baseline, pair.before, starts=2)
+    if not all(sv.changed(fit, log).named for log in pair.alone):
+        return None
+    asked = time.process_time() if pair.alone else began
     change = sv.changed(fit, pair.after)
     named = [e.id for e in change.named]
     groups = {e.id: list(e.group) for e in change.named}
@@ -55,7 +59,7 @@ def judged(pair: Pair) -> Row:
         "headline": change.to_dict()["headline"],
         "truths": [_of(t, change) for t in pair.truths],
         "wrong": [e for e in named if not right & {e, *groups[e]}],
-        "seconds": time.process_time() - began,
+        "seconds": time.process_time() - asked,
     }
 
 
@@ -114,6 +118,10 @@ def main() -> None:
     parser.add_argument("--unchanged", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="number of the first pair")
     parser.add_argument("--kind", choices=ASKED, default="", help="of all pairs")
+    parser.add_argument("--driving", choices=DRIVING, default="", help="of all pairs")
+    parser.add_argument(
+        "--apart", action="store_true", help="of two changes only pairs where each alone is named"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="a line for each pair")
     parser.add_argument("--read", nargs="+", type=Path, metavar="FILE")
     args = parser.parse_args()
@@ -127,9 +135,12 @@ def main() -> None:
         if number < args.first:
             continue
         try:
-            row = judged(drawn(args.seed, number, kind))
+            pair = drawn(args.seed, number, kind, args.driving, apart=args.apart)
+            row = judged(pair)
         except sv.SysidError as e:
             print(f"{number:3d} {kind}: {e}", flush=True)
+            continue
+        if row is None:
             continue
         rows.append(row)
         print(line(number, row), flush=True)

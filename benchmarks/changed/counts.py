@@ -31,6 +31,7 @@ def table(rows: Sequence[Row]) -> str:
             str(sum(len(r["wrong"]) for r in some)),
         )
         lines.append("  ".join([f"{kind:>16s}", *(f"{c:>8s}" for c in cells)]))
+    lines += _of_two([r for r in rows if r["kind"] == "two"])
     none = [r for r in rows if not r["truths"]]
     claimed = [r for r in none if r["named"]]
     something = [r for r in none if r["unknown"] and not r["named"]]
@@ -45,3 +46,22 @@ def table(rows: Sequence[Row]) -> str:
         f"{sum(bool(r['unknown']) for r in rows if r['truths'])}"
     )
     return "\n".join(lines)
+
+
+def _of_two(rows: Sequence[Row]) -> list[str]:
+    """What was said of pairs with two changes, by what drove them apart."""
+    if not rows:
+        return []
+    told = [_both(r) for r in rows]
+    kinds = ("both", "one of two", "wrong name", "something", "nothing")
+    return ["two changes: " + ", ".join(f"{k} {told.count(k)}" for k in kinds)]
+
+
+def _both(row: Row) -> str:
+    """Whether both changes are named and nothing else, one, something else, or none."""
+    if row["wrong"]:
+        return "wrong name"
+    named = [t["group"] for t in row["truths"]]
+    if any(named):
+        return "both" if all(named) else "one of two"
+    return "nothing" if row["headline"] == "no change is shown" else "something"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,8 +28,11 @@ KINDS = (
 ASKED = (*KINDS, "steering delay", "yaw inertia")
 """With those that are not drawn, but made where they are asked for."""
 
+DRIVING = ("lap", "handling", "sweep", "ramp")
+
 _RATE_HZ = 50.0
 _SECONDS = 40.0
+_SWEEP_S = 25.0
 _EASIER = (1.0, 0.85, 0.7, 0.55, 0.4)
 _SHARES = {"limit": 0.88, "gentle": 0.45}  # of what the tyres give
 _LACKING = ("", "", "body_attitude", "tyre_relaxation", "lateral_load_transfer", "steer_compliance")
@@ -56,7 +60,13 @@ class Truth:
 
 @dataclass
 class Pair:
-    """Two drives of a car, and what is between them."""
+    """Two drives of a car, and what is between them.
+
+    Attributes
+    ----------
+    alone : list of Log
+        The second drive after each of two changes without the other one, where they are asked for.
+    """
 
     kind: str
     driving: str
@@ -66,11 +76,13 @@ class Pair:
     baseline: sv.Model
     before: sv.Log
     after: sv.Log
-    more: Names = field(default_factory=dict)
+    alone: list[sv.Log] = field(default_factory=list)
 
 
-def drawn(seed: int, number: int, kind: str = "") -> Pair:
-    """Pair `number` of a seed, of a kind that is drawn where none is given."""
+def drawn(
+    seed: int, number: int, kind: str = "", driving: str = "", *, apart: bool = False
+) -> Pair:
+    """Pair `number` of a seed, of a kind and in driving that are drawn where none is given."""
     rng = np.random.default_rng([seed, number])
     drew = str(rng.choice(KINDS))
     kind = kind or drew
@@ -80,22 +92,31 @@ def drawn(seed: int, number: int, kind: str = "") -> Pair:
     order = rng.permutation([k for k in KINDS if k not in ("nothing", "two")])
     several = [k for k in order if k != "downforce"]  # of cars that have some
     first = [str(several[0])]
-    apart = [str(k) for k in several[1:] if not {first[0], str(k)} <= {"grip", "friction"}]
-    todo = [*first, apart[0]] if kind == "two" else [kind]
+    others = [str(k) for k in several[1:] if not {first[0], str(k)} <= {"grip", "friction"}]
+    todo = [*first, others[0]] if kind == "two" else [kind]
+    singles: list[sv.Model] = []
     for what in todo:
+        singles.append(_changed(car, what, deepcopy(rng), []))
         changed = _changed(changed, what, rng, truths)
     name = str(rng.choice(list(_SHARES)))
     road = bool(rng.random() < 0.5)
     courses = [str(rng.choice(("lap", "handling"))) for _ in range(2)]
     if rng.random() < 0.4:
         courses[1] = courses[0]
+    if driving:
+        courses = [driving, driving]
     noise = sv.SensorNoise().scaled(float(rng.choice((0.7, 1.0, 1.5))))
     seeds = [int(s) for s in rng.integers(2**31, size=2)]
     logs = [
         _driven(model, course, _SHARES[name] * _limit(model), road, noise, s)
         for model, course, s in zip((car, changed), courses, seeds, strict=True)
     ]
-    return Pair(kind, f"{name} {'-'.join(courses)}", lacks, road, truths, baseline, *logs)
+    alone = [
+        _driven(model, courses[1], _SHARES[name] * _limit(model), road, noise, seeds[1])
+        for model in (singles if apart and len(todo) > 1 else [])
+    ]
+    told = f"{name} {'-'.join(courses)}"
+    return Pair(kind, told, lacks, road, truths, baseline, *logs, alone)
 
 
 def _car(rng: np.random.Generator, kind: str) -> tuple[sv.Model, sv.Model, str]:
@@ -213,12 +234,17 @@ def _driven(
     pushes = sv.RoadDisturbance()
     if road:
         pushes = sv.RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
-    made = sv.manoeuvres.lap if course == "lap" else sv.manoeuvres.handling_course
+    made = {
+        "lap": lambda a: sv.manoeuvres.lap(_SECONDS, lateral_mps2=a),
+        "handling": lambda a: sv.manoeuvres.handling_course(_SECONDS, lateral_mps2=a),
+        "sweep": lambda a: sv.manoeuvres.sine_sweep(_SWEEP_S, lateral_mps2=a),
+        "ramp": lambda a: sv.manoeuvres.ramp_steer(lateral_mps2=a, rise_s=4.0),
+    }[course]
     for ease in _EASIER:
         try:
             return sv.drive(
                 model,
-                made(_SECONDS, lateral_mps2=ease * mps2),
+                made(ease * mps2),
                 seed=seed,
                 noise=noise,
                 disturbance=pushes,

@@ -49,6 +49,19 @@ def test_evidence_is_the_integral_of_likelihood_times_prior(side: float, ratio: 
     assert found.stds[0, 0] == pytest.approx(np.sqrt(second - mean**2), abs=1e-5)
 
 
+def test_what_goes_with_an_effect_is_told_with_both_of_them_free() -> None:
+    """Fitted alone it made up for most of the other one; its own score says nothing of that."""
+    alike = 0.95
+    information = 400.0 * np.array([[1.0, alike, 0.0], [alike, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    m = model(information, information @ np.array([-alike, 1.0, 0.2]))
+    assert m.score[0] == pytest.approx(0.0, abs=1e-9)
+    assert m.beside(("e0",))["e1"] > m.beside(("e0",))["e2"] + 3.0
+    assert set(m.beside(("e0",))) == {"e1", "e2"}
+    subsets = {s.effects: s.log_odds for s in m.subsets()}
+    gain = subsets["e0", "e1"] - subsets["e0",]
+    assert m.beside(("e0",))["e1"] == pytest.approx(gain, abs=1e-6)
+
+
 def test_two_that_hold_only_together_are_found() -> None:
     """Almost the same direction with opposite sizes: each alone explains next to nothing."""
     alike = 0.98

@@ -69,7 +69,10 @@ def test_what_is_added_counts_where_it_gains_beyond_a_lack(
     gain = alone.reached - nothing.reached
     assert gain > 100.0
 
-    def beside(reached: float) -> float:
+    def beside(reached: float, *, shared: float) -> float:
+        monkeypatch.setattr(
+            offset.search.reference, "sharing", lambda *_: alone.log_likelihood - shared
+        )
         both = replace(
             alone,
             put=(OFFSET, RATIO),
@@ -81,8 +84,10 @@ def test_what_is_added_counts_where_it_gains_beyond_a_lack(
         evidence = offset.search.evidence
         return evidence(both, offset.told, 1.0) - evidence(alone, offset.told, 1.0)
 
-    assert beside(-1.0) < 0.0  # though it is 500 nats likelier among others
-    assert beside(1.0) > 450.0
+    assert beside(-1.0, shared=0.0) < 0.0  # though it is 500 nats likelier among others
+    assert beside(1.0, shared=0.0) > 450.0
+    # All changes in both drives the same are a compromise: this one alone is none.
+    assert beside(-1.0, shared=500.0) > 450.0
 
 
 def test_a_size_is_as_far_from_nothing_as_its_likelihood_says(offset: Saying) -> None:

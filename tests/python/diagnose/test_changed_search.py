@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from sysid_vehicle.diagnose.change.both_axles import FRICTION, STIFFNESS, by_other_names, hold_tyres
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
 from sysid_vehicle.rules import USUAL
@@ -38,7 +39,8 @@ def searching(
     }
     search.start = None  # type: ignore[assignment]
     search.reference = SimpleNamespace(  # type: ignore[assignment]
-        climbed=lambda _, s: SimpleNamespace(put=s.put, changes={}, climbed=True)
+        climbed=lambda _, s: SimpleNamespace(put=s.put, changes={}, climbed=True),
+        nothing=search.visited[frozenset()],
     )
     monkeypatch.setattr(search, "told", lambda state: Told(state.put, lines))
     monkeypatch.setattr(search, "_leading", lambda _, state: state.put)
@@ -138,6 +140,72 @@ def test_a_group_is_off_nothing_where_one_of_it_is() -> None:
     assert named("lag", "delay") == ("lag", "delay")
     assert named("delay") == ("lag", "delay")
     assert not named()
+
+
+def test_of_two_changes_each_leads_to_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What imitates both is likelier than either: from there lines lead to neither."""
+    imitator, one, other = ("force_gain",), ("mass",), ("aero_drag",)
+    put = {(): 0.0, imitator: 90.0, one: 60.0, other: 20.0}
+    lines = dict.fromkeys(("force_gain", "mass", "aero_drag", "road_grade"), 1e-9)
+    goes_with = {
+        "force_gain": {"road_grade": 4.0, "clock of fx_n": 9.0},
+        "mass": {"aero_drag": 9.0},
+    }
+    search = searching(monkeypatch, lines, put)
+    for m in search.can.values():
+        m.names = ()  # type: ignore[misc]
+    tried: list[frozenset[str]] = []
+    monkeypatch.setattr(search, "_visit", lambda few, *_: tried.append(frozenset(few)))
+    monkeypatch.setattr(
+        search,
+        "told",
+        lambda state: SimpleNamespace(beside_put=goes_with.get(state.put[0], {})),
+    )
+    search._in_twos()
+    assert tried == [frozenset((*imitator, "road_grade")), frozenset(one + other)]
+
+
+def test_an_added_change_is_none_where_it_does_as_well_as_a_lack() -> None:
+    """All changes in both drivings the same are a compromise, which says nothing of the added."""
+    part, both = ("mass",), ("mass", "cg_position")
+    figures = {(): (0.0, 0.0), part: (900.0, 500.0), both: (990.0, 450.0)}
+    shares = {"cg_position": 910.0}
+
+    def evidence() -> float:
+        search = Search.__new__(Search)
+        search.rules, search.start = USUAL, None  # type: ignore[assignment]
+        search.visited = {
+            frozenset(p): SimpleNamespace(  # type: ignore[misc]
+                put=p, sizes={}, log_likelihood=value, among=value, reached=reached
+            )
+            for p, (value, reached) in figures.items()
+        }
+        search.reference = SimpleNamespace(  # type: ignore[assignment]
+            sharing=lambda _, state, few: shares["".join(few)]
+        )
+        told = SimpleNamespace(price=lambda *_: 5.0)
+        return search.evidence(search.visited[frozenset(both)], told, 1.0)  # type: ignore[arg-type]
+
+    assert evidence() == 985.0
+    shares["cg_position"] = 989.0
+    assert evidence() == 445.0
+
+
+def test_what_changes_each_axle_does_not_speak_against_a_change_of_both() -> None:
+    front, rear = "tyre_front", "tyre_rear"
+    assert hold_tyres({front, rear, "mass"}, STIFFNESS)
+    assert not hold_tyres({front, "mass"}, STIFFNESS)
+    assert not hold_tyres({front, rear}, "mass")
+
+
+def test_tyres_have_other_names_beside_another_change_of_them() -> None:
+    front, rear = "tyre_front", "tyre_rear"
+    assert set(by_other_names(front, (front, rear))) == {FRICTION, STIFFNESS}
+    assert set(by_other_names(STIFFNESS, (STIFFNESS, front))) == {rear, FRICTION}
+    # Alone, and of both axles alone, they have none.
+    assert by_other_names(front, (front, "mass")) == ()
+    assert by_other_names(STIFFNESS, (STIFFNESS, FRICTION)) == ()
+    assert by_other_names("mass", (front, "mass")) == ()
 
 
 def test_a_change_by_other_names_does_not_speak_against_it(

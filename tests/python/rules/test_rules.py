@@ -34,7 +34,7 @@ NUMERICAL = {
     },
     "diagnose/change/pieces.py": {"_OUTERMOST", "_PIECES", "_POINTS"},
     "diagnose/change/reference.py": {"_FOLLOWED", "_LOOSE", "_VAGUE"},
-    "diagnose/change/search.py": {"_CLOSE", "_ROUNDS", "_TRIED"},
+    "diagnose/change/search.py": {"_BESIDE", "_CLOSE", "_ROUNDS", "_TRIED"},
     "diagnose/change/together.py": {"_FAR", "_SHARES"},
     "diagnose/candidates/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/evidence/coordinates.py": {"BLOCK_S", "_MOVED"},

@@ -262,6 +262,23 @@ class ScoreModel:
         order = sorted(best.items(), key=lambda k: -k[1][0])
         return tuple(Subset(tuple(sorted(n)), odds, columns) for n, (odds, _, columns) in order)
 
+    def beside(self, effects: Sequence[str]) -> dict[str, float]:
+        """Log-odds of each other effect together with some, against these alone.
+
+        All of their parameters are told together: those of the few are no longer what made up for
+        the other one.
+        """
+        whole = {h.name: h for h in self.hypotheses}  # the form with all parameters comes last
+        few = tuple(whole[e] for e in effects)
+        more = [(h, prior) for h, prior in zip(self.hypotheses, self._log_prior, strict=True)
+                if h.name not in effects]  # fmt: skip
+        alone, *together = self._log_factors([few, *((*few, h) for h, _ in more)])
+        found: dict[str, float] = {}
+        for (h, prior), log_bf in zip(more, together, strict=True):
+            log_odds = float(prior + log_bf - alone)
+            found[h.name] = float(np.logaddexp(found.get(h.name, -np.inf), log_odds))
+        return found
+
     def _log_factors(self, sets: Sequence[Sequence[Hypothesis]]) -> FloatArray:
         """Log Bayes factor of each set of hypotheses against nothing."""
         out = np.empty(len(sets))

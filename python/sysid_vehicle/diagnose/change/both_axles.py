@@ -8,7 +8,8 @@ is no more than other tyres, so that no model of the catalogue has it.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,10 +17,12 @@ import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect, Parameter
+from ...errors import InvalidInput
 from ...estimate import Driving
 from ...model import Model
 from ...vehicle import AXLES
 from .both_drivings import OneDriving
+from .may_change import May
 
 FRICTION, STIFFNESS = "friction_both_axles", "stiffness_both_axles"
 _POWERS = {FRICTION: {"D": 1, "B": -1}, STIFFNESS: {"B": 1}}
@@ -70,13 +73,41 @@ SCALINGS = tuple(_effect(of) for of in _POWERS)
 """Effects that multiply tyres; the compiled model does not know them (`Scaled` does)."""
 
 
-def hold_tyres(put: Collection[str], axle: str) -> bool:
-    """Whether changes hold one of the tyres of an axle, `tyre_rear` say, by other names.
+def hold_tyres(put: Collection[str], effect: str) -> bool:
+    """Whether changes hold one of the tyres, `tyre_rear` say, by other names.
 
-    What changed both axles and was taken back at the other one changed this one.
+    What changed both axles and was taken back at the other one changed this one; what changed each
+    axle may have changed both.
     """
-    other = {f"tyre_{a}" for a in AXLES} - {axle}
-    return len(other) < len(AXLES) and other <= {*put} and not _POWERS.keys().isdisjoint(put)
+    axles = {f"tyre_{a}" for a in AXLES}
+    if effect in _POWERS:
+        return axles <= {*put}
+    return effect in axles and axles - {effect} <= {*put} and not _POWERS.keys().isdisjoint(put)
+
+
+def by_other_names(effect: str, put: Collection[str]) -> tuple[str, ...]:
+    """What changes the tyres as an effect does beside other changes of them, one axle's at least.
+
+    Both axles softer and the front one more is each axle softer by its own share.
+    """
+    axles = tuple(f"tyre_{a}" for a in AXLES)
+    several = (*axles, *_POWERS)
+    rest = {*put} - {effect}
+    if effect not in several or rest.isdisjoint(several) or not {effect, *rest} & {*axles}:
+        return ()
+    return tuple(e for e in several if e != effect and e not in rest)
+
+
+def seated(
+    model: Model, tyres: Sequence[May], free: Collection[str], users: Sequence[Effect]
+) -> tuple[Effect, ...]:
+    """Changes of the tyres of both axles, where these are fitted and there is room for them."""
+    if not all({*free}.issuperset(m.names) for m in tyres):
+        return ()
+    with suppress(InvalidInput):
+        model.add(*users, *SCALINGS)
+        return SCALINGS
+    return ()
 
 
 def _scalings_of(model: Model) -> list[Effect]:

@@ -97,7 +97,10 @@ class Change(Printed):
         return LoadChange(mass * more, mass * more_std, place, float(std))
 
     def _headline(self) -> str:
-        leading = [e for e in self.named if not any(self._before(g, e) for g in e.group)]
+        named = {e.id: e for e in self.named}
+        # Another one may be a rival of two of them.
+        first = [next((e for e in s.effects if e in named), "") for s in self.causes.sets]
+        leading = [named[e] for e in dict.fromkeys(first) if e]
         told = [
             f"{e} ({'; confounded with '.join(filter(None, (e.sure, ', '.join(e.group))))})"
             for e in leading
@@ -127,10 +130,6 @@ class Change(Printed):
                 f"a probability of {number(self.nothing, 2)}"
             )
         return "no change is shown"
-
-    def _before(self, effect: str, e: EffectChange) -> bool:
-        order = [one.id for one in self.named]
-        return effect in order and order.index(effect) < order.index(e.id)
 
     _HEAD = ("what", "by how much", "how sure", "")
 

@@ -55,6 +55,8 @@ class Competition:
     causes : Causes
     alone : tuple of str
         What may have changed by itself, the likeliest first.
+    beside_put : dict of str to float
+        Log-odds of what may have changed together with what was put in, against that alone.
     """
 
     def __init__(
@@ -322,9 +324,9 @@ class Competition:
             self._ratio,
             self._rules.nothing,
         )
-        known = replace(
-            model, hypotheses=tuple(h for h in self._hypotheses if not h.name.startswith(UNKNOWN))
-        )
+        named = (h for h in self._hypotheses if not h.name.startswith(UNKNOWN))
+        known = replace(model, hypotheses=tuple(named))
+        self.beside_put = known.beside(self.put) if self.put else {}
         alone = tuple(e for s in known.subsets(1) for e in s.effects)
         parameters = {m.id: m.parameters for m in self._may}
         return causes_in(model, known, scale, parameters, self._rules, most=_MOST), alone
@@ -353,9 +355,12 @@ class Competition:
         columns = [c for name in put for c in self._whole[name].columns]
         scale = self._scale[columns]
         block = self._information[np.ix_(columns, columns)] * np.outer(scale, scale)
-        known = np.eye(len(columns)) + block / self.ratio_of(put)
+        block = block / self.ratio_of(put)
+        known = np.eye(len(columns)) + block
         sizes = np.array([changed_by[n] for e in put for n in self._of(e).names]) / scale
-        occam = 0.5 * float(np.linalg.slogdet(known)[1]) + 0.5 * float(sizes @ sizes)
+        # Of what no driving tells the likeliest size is any, and the prior's loses nothing.
+        far = float(sizes @ block @ np.linalg.solve(known, sizes))
+        occam = 0.5 * float(np.linalg.slogdet(known)[1]) + 0.5 * far
         return occam + len(as_one(put)) * self._of_one
 
     @property

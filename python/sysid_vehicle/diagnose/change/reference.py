@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -14,6 +14,7 @@ from ...errors import NumericalError
 from ...identify import Fit, lost_to_input_noise
 from ...identify.search.box import free_box
 from ...identify.search.climb import climb as to_the_maximum
+from ...identify.search.objective import Objective
 from ...model import Model
 from ...rules import USUAL, Rules
 from ..candidates.possible import OF_A_FACTOR
@@ -94,7 +95,11 @@ class Reference:
         Their columns, and those of clocks.
     shared : Shared
         Effects that the model lacks are about as large as usual, or nothing.
+    nothing : Exact
+        Both drivings without a change, at the highest maximum that any search came to.
     """
+
+    nothing: Exact
 
     def __init__(
         self,
@@ -123,8 +128,11 @@ class Reference:
                 mean, std = model.priors[name]
                 precision[i], centre[i] = std**-2, mean - model.value(name)
         self.shared = Shared(as_float64(precision), centre)
+        self._of = {n: m.id for m in may for n in m.names}
+        self._of |= {n: e.id for e in SCALINGS for n in e.named}
         self._both = Together(before, self.place, self.shared)
         self._fitted: dict[frozenset[str], tuple[Model, float]] = {}
+        self._sharing: dict[tuple[frozenset[str], frozenset[str], bool], float] = {}
         self._nothing, self._unchanged = -np.inf, model
         self._likeliest = self._best = -np.inf  # of later driving, and less what both share
         self._alone = self._fit(before, (), {}, {})[1]
@@ -183,10 +191,15 @@ class Reference:
         if not put:
             model, value = self._fit(start, put, sizes, usual, own)
             model, value = self._climbed(start, model, own, [], [])
-            self._nothing, self._unchanged = value, model
-            return self._exact(start, put, sizes, model, value, climbed=True)
+            return self._without(start, model, value)
         model, value = self._fit(start, put, sizes, usual, own, also)
         return self._exact(start, put, sizes, model, value, climbed=False)
+
+    def _without(self, start: Fit, model: Model, value: float) -> Exact:
+        """Nothing changed."""
+        self._nothing, self._unchanged = value, model
+        self.nothing = self._exact(start, (), (), model, value, climbed=True)
+        return self.nothing
 
     def climbed(self, start: Fit, state: Exact) -> Exact:
         """The same at the maximum of the likelihood, as is what nothing changed.
@@ -198,6 +211,25 @@ class Reference:
         own, names = self._fitted[frozenset(state.put)][0], list(state.changes)
         model, value = self._climbed(start, state.searched, own, names, names)
         return self._exact(start, state.put, names, model, value, climbed=True)
+
+    def sharing(self, start: Fit, state: Exact, few: Collection[str]) -> float:
+        """Log-likelihood of a state in which some of what was put in is in both drivings the same.
+
+        The rest changes as in the state: what the reference refuses of that says nothing of these.
+        """
+        key = (frozenset(state.put), frozenset(few), state.climbed)
+        if key not in self._sharing:
+            own, later = self._fitted[key[0]][0], state.searched
+            alike = {n for n in state.changes if self._of[n] in few}
+            changed = [n for n in state.changes if n not in alike]
+            loose = [*changed, *alike.difference(self.before.model.free_names)]
+            objective = self._both.objective(start, later, own, loose, changed)
+            ends = [{n: m.value(n) for n in alike} for m in (own, later)]
+            ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in alike})
+            best, reached = self._followed(objective, later, ends, climb=state.climbed)
+            fit = replace(start, model=as_tyres(best))
+            self._sharing[key] = reached + lost_to_input_noise(fit, fit.driving)
+        return self._sharing[key]
 
     def _exact(
         self,
@@ -218,7 +250,10 @@ class Reference:
             seconds = [d.usable_s for d in (self.before.driving, start.driving)]
             wanted = self._fitted[frozenset(put)][1] - self._alone
             wanted *= sum(seconds) / seconds[0]  # as much in each second of both
-            same, allowed = self._same(start, own, model, wanted, climb=climbed)
+            same, allowed, both = self._same(start, own, model, wanted, climb=climbed)
+            if {*both.effects} == {*start.model.effects} and same > self._nothing:
+                # Tyres that are in both the same are no change: searches end in several valleys.
+                self._without(start, both, same)
             reached -= max(same - self._nothing, 0.0)
             among -= max(allowed - self._nothing, 0.0)
         self._best = max(self._best, reached)
@@ -247,29 +282,42 @@ class Reference:
 
     def _same(
         self, start: Fit, own: Model, apart: Model, wanted: float, *, climb: bool
-    ) -> tuple[float, float]:
-        """Log-likelihoods of both drivings where what was put in is in both the same.
+    ) -> tuple[float, float, Model]:
+        """Log-likelihoods of both drivings where what was put in is in both the same, and where.
 
         The second one gains no more than the reference alone wants (`wanted`, of both drivings),
         where it refuses the compromise of both. Tyres that are multiplied in both are other tyres
         of both.
         """
         own, apart = without(own), as_tyres(apart)
-        noise, box = self.before.noise.vector(), free_box(apart)
         changed = [n for n in apart.free_names if n not in self.before.model.free_names]
         objective = self._both.objective(start, apart, own, changed, [])
         ends = [{n: m.value(n) for n in apart.free_names} for m in (own, apart)]
         ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in apart.free_names})
         ends.append(ends[0] | {n: self._unchanged.value(n) for n in self._unchanged.free_names})
-        starts = [box.inside(apart.with_values(e).vector()) for e in ends]
+        both, value = self._followed(objective, apart, ends, climb=climb)
+        loss = 0.5 * self._squared({n: both.value(n) - own.value(n) for n in changed})
+        allowed = value if loss <= self._rules.told else min(value, self._nothing + wanted)
+        return value, allowed, both
+
+    def _followed(
+        self,
+        objective: Objective,
+        model: Model,
+        ends: Sequence[Mapping[str, float]],
+        *,
+        climb: bool,
+    ) -> tuple[Model, float]:
+        """Where a search from the best of some starts ends, and its log-likelihood."""
+        noise, box = self.before.noise.vector(), free_box(model)
+        starts = [box.inside(model.with_values(e).vector()) for e in ends]
         gains = objective.freeze(starts[0], noise)
         begin = min(starts, key=lambda p: cost(objective, p, gains))
         p, value = highest(objective, begin, noise, box)
         if climb:
             p, _, value = to_the_maximum(objective, p, noise, box)
-        off = {n: float(p[apart.parameters[n].column]) - own.value(n) for n in changed}
-        loss = 0.5 * self._squared(off)
-        return value, value if loss <= self._rules.told else min(value, self._nothing + wanted)
+        values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
+        return model.with_values(values), value
 
     def _squared(self, off: Mapping[str, float]) -> float:
         """Squared standard errors of the reference by which parameters are off, all else free."""

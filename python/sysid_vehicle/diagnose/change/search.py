@@ -18,7 +18,7 @@ from ...vehicle import AXLES, GRAVITY_MPS2
 from ..candidates.clocks import CLOCKS
 from ..candidates.possible import considered
 from .beside_reference import Differences, Side
-from .both_axles import SCALINGS, factors, hold_tyres, moves, without
+from .both_axles import SCALINGS, by_other_names, factors, hold_tyres, moves, seated, without
 from .changes_compete import Competition
 from .may_change import (
     PAYLOAD,
@@ -33,14 +33,12 @@ from .may_change import (
 from .one_point import Lines
 from .pieces import Pieces
 from .reference import Exact, Reference
+from .rivals import beside, in_place, instead, leading
 
 _TRIED = 5  # of the best single changes, exactly
+_BESIDE = 2  # of what goes best with each of these
 _ROUNDS = 4  # times that scores are taken anew
 _CLOSE = 4.0  # nats of evidence, that a search may end below the maximum
-
-
-def _instead(put: tuple[str, ...], effect: str, rival: str) -> tuple[str, ...]:
-    return tuple(rival if e == effect else e for e in put)
 
 
 class Search:
@@ -85,28 +83,19 @@ class Search:
             for e in considered(model, candidates)
             if e.scanned is None and e.id in lacked and all(d.shows(e) for d in both)
         )
-        own = (e for e in model.parts if e.scanned is None and free.issuperset(e.named))
         self.tyres = tuple(of_tyre(model, a) for a in AXLES)
+        own = (e for e in model.parts if e.scanned is None and free.issuperset(e.named))
         several = [*map(of_effect, (*own, *effects)), *self.tyres]
         if YAW_INERTIA in free:
             several.append(of_inertia(model))
         clocks = [c for c in CLOCKS if c.channel != "fx_n" or start.driving.force_known]
         fitted = [m for m in several if m.id in {e.id for e in effects} or free.issuperset(m.names)]
         self.reference = Reference(before, fitted, effects, rules)
-        self._scalings = self._seated(free, [e for e in effects if e.acts])
+        self._scalings = seated(model, self.tyres, free, [e for e in effects if e.acts])
         fitted += map(of_effect, self._scalings)
         self.can = {m.id: m for m in fitted}
         self.may = [*fitted, *map(of_clock, clocks)]
         self.visited: dict[frozenset[str], Exact] = {}
-
-    def _seated(self, free: set[str], users: Sequence[Effect]) -> tuple[Effect, ...]:
-        """Changes of the tyres of both axles, where these are fitted and there is room for them."""
-        if not all(free.issuperset(m.names) for m in self.tyres):
-            return ()
-        with suppress(InvalidInput):
-            self.start.model.add(*users, *SCALINGS)
-            return SCALINGS
-        return ()
 
     @cached_property
     def singles(self) -> Competition:
@@ -126,21 +115,33 @@ class Search:
         """What competes where the changes that explain most have been put in, and these."""
         told = self.singles
         state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
+        left = self.told(state).causes.sets if state.put else ()
+        if any({*state.put}.isdisjoint(s.effects) for s in left):
+            self._in_twos()
+            state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
         seen: set[tuple[str, ...]] = set()
         for _ in range(_ROUNDS):
             told = self.told(state)
             seen.add(state.put)
             self._visit(self._leading(told, state), told)
             for effect in state.put:
-                for rival in self._rivals(effect, told):
-                    self._visit(_instead(state.put, effect, rival), told)
+                for rival in in_place(effect, told, self.can):
+                    self._visit(instead(state.put, effect, rival), told)
             best, state = self._best(told, state), self.visited[frozenset(state.put)]
-            if best is state:
-                best = self._better(state, told)
+            best = self._better(state, told) if best is state else best
             if best.put in seen:
                 break
             state = best
         return self._settled(told, state)
+
+    def _in_twos(self) -> None:
+        """Of each change that was fitted alone, that together with what lines name beside it."""
+        for state in [s for s in self.visited.values() if s.put]:
+            with suppress(InvalidInput):  # tyres that are multiplied may be beyond any
+                told = self.told(state)
+                for more in beside(told, self.can, self.rules)[:_BESIDE]:
+                    start = dict.fromkeys(self.can[more].names, 0.0) | state.changes
+                    self._visit((*state.put, more), told, (start,))
 
     def _settled(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
         """What will be named has been put in, and not a rival of it: sizes are told beside it."""
@@ -173,6 +174,7 @@ class Search:
         if not state.climbed:
             with suppress(NumericalError, np.linalg.LinAlgError):
                 self.visited[frozenset(state.put)] = self.reference.climbed(self.start, state)
+                self.visited[frozenset()] = self.reference.nothing
         return self.visited[frozenset(state.put)]
 
     def _shown(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
@@ -243,7 +245,7 @@ class Search:
             odds = self.odds(effect, state, told)
             best = max(odds, key=lambda e: odds[e])
             if best != effect:
-                return self.visited[frozenset(_instead(state.put, effect, best))]
+                return self.visited[frozenset(instead(state.put, effect, best))]
         return state
 
     def odds(self, effect: str, state: Exact, told: Competition) -> dict[str, float]:
@@ -251,16 +253,20 @@ class Search:
 
         A rival is fitted together with it too, in the reference and in the later driving: which of
         the two differs tells more than which of them alone is likelier, as what the reference left
-        may speak for one of them. Of tyres no line tells it (`_off_nothing`).
+        may speak for one of them. Of tyres no line tells it (`_off_nothing`); and what changes them
+        by other names, no less likely, is no less likely for its more coefficients.
         """
         ratio, odds = told.ratio_of(state.put), {effect: 0.0}
         here, nothing = self.evidence(state, told, ratio), self.visited[frozenset()]
         least = self.rules.near * (state.reached - nothing.reached)
         for rival in self.can:
-            other = self.visited.get(frozenset(_instead(state.put, effect, rival)))
+            other = self.visited.get(frozenset(instead(state.put, effect, rival)))
             if rival in state.put or other is None:
                 continue
             odds[rival] = self.evidence(other, told, ratio) - here
+            if rival in by_other_names(effect, state.put):
+                gain = (other.log_likelihood - state.log_likelihood) / ratio
+                odds[rival] = max(odds[rival], min(gain, 0.0))
             if other.reached - nothing.reached < least:
                 continue
             both = (*state.put, rival)
@@ -279,16 +285,6 @@ class Search:
                 prices = (told.price(s.put, s.sizes) for s in (state, other))
                 odds[rival] = 0.5 * (w - v) / ratio + next(prices) - next(prices)
         return odds
-
-    def _rivals(self, effect: str, told: Competition) -> list[str]:
-        """What may have changed in its place."""
-        own = told.causes.of(effect)
-        several = (
-            *self.can[effect].rivals,
-            *(e for e, m in self.can.items() if effect in m.rivals),
-            *(() if own is None else own.effects),
-        )
-        return [e for e in dict.fromkeys(several) if e in self.can and e not in told.put]
 
     def told(self, state: Exact, *, at_one_point: bool = False) -> Competition:
         """What competes beside what was put in."""
@@ -320,13 +316,7 @@ class Search:
         )
 
     def _leading(self, told: Competition, state: Exact) -> tuple[str, ...]:
-        """Of each credible set the likeliest that can be fitted, or what was, if it is like it."""
-        found = []
-        for s in told.causes.sets:
-            known = next((e for e in s.effects if e in state.put), "")
-            known = known or told.acts_like(s.effects[0])
-            found.append(known or next((e for e in s.effects if e in self.can), ""))
-        return tuple(dict.fromkeys(e for e in (*state.put, *found) if e))
+        return leading(told, state.put, self.can)
 
     def _visit(
         self,
@@ -343,6 +333,7 @@ class Search:
             told_by_lines = {n: told.sizes[n] for n in usual}
             exact = self.reference.fitted(self.start, put, told_by_lines, usual, also)
             self.visited[frozenset(put)] = exact
+            self.visited[frozenset()] = self.reference.nothing
 
     def lacking(self, effect: str, state: Exact, group: Sequence[str]) -> list[Exact]:
         """What was fitted, to its maximum, without an effect and all of its group.
@@ -364,16 +355,25 @@ class Search:
     def evidence(self, state: Exact, told: Competition, ratio: float) -> float:
         """Log-likelihood over the variance ratio, less the price of the changes [nats].
 
-        Among what is likelier than nothing, and than each part of it, that by which these compare:
-        what is added and only gains as a lack of the reference does is no change.
+        Among what is likelier than nothing, and adds changes to each part of it, that by which
+        these compare: what is added and only gains as a lack of the reference does is no change.
         """
         price = told.price(state.put, state.sizes)
-        nothing = self.visited[frozenset()].reached / ratio
+        more = self.over_nothing(state, told, ratio) > 0.0 and not self._lacking_in_both(
+            state, ratio
+        )
+        return (state.among if more else state.reached) / ratio - price
+
+    def _lacking_in_both(self, state: Exact, ratio: float) -> bool:
+        """Whether some of what was put in does as well where it is in both drivings the same."""
         put = frozenset(state.put)
-        parts = [v.reached for k, v in self.visited.items() if k < put]
-        more = state.reached / ratio - price > nothing and state.reached >= max(parts)
-        told_by = state.among if more else state.reached
-        return told_by / ratio - price
+        return any(
+            state.among <= part.among
+            or state.log_likelihood - self.reference.sharing(self.start, state, put - key)
+            < self.rules.told * ratio
+            for key, part in self.visited.items()
+            if key < put and part.reached > state.reached
+        )
 
     def over_nothing(self, state: Exact, told: Competition, ratio: float) -> float:
         """By how much a state is likelier than that nothing changed [nats]."""
