@@ -165,7 +165,7 @@ _LEAST_DISTURBANCE = 1e-3  # of the weight
 # Slower forces are what effects are: drag, wind, slopes. A varying road slope has its own states.
 _TIMES_S = (0.01, 1.0)
 _ROAD_TIMES_S = (1.0, 20.0)
-_COLOUR_TIMES_S = (0.01, 0.5)  # what is slower is an offset that wanders
+_COLOUR_TIMES_S = (0.01, 0.1)  # what is slower moves as the driving does, and may be a fault
 _SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])
 
 

@@ -111,7 +111,7 @@ def test_a_refit_ends_with_a_round_that_gains_next_to_nothing(
     """The maximum with frozen gains and that of the likelihood are not quite the same place."""
     car = truth.add("mass").with_values({"mass.relative_error": 0.1})
     fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3, rate_hz=50.0), starts=1)
-    module, reached = sys.modules["sysid_vehicle.identify.maximum"], []
+    module, reached = sys.modules["sysid_vehicle.identify.search.scanned"], []
 
     def seen(objective: Objective, *rest: Any, **options: Any) -> tuple[np.ndarray, Any]:
         found, gains = moved(objective, *rest, **options)

@@ -10,6 +10,7 @@ from sysid_vehicle import (
     InvalidInput,
     Log,
     Model,
+    NoiseModel,
     RunsFit,
     Vehicle,
     compare,
@@ -105,8 +106,9 @@ def test_derivatives_by_common_parameters_add_up(start: Model, runs: dict[str, L
         parts.append(Copied(Driving.of(log).problem(model), source))
     both = objective_of(model, Mapped(tuple(parts)), Driving.of(list(runs.values())))
     q = np.append(model.vector(), -0.02)
-    noise = np.array([0.03, 0.03, 0.0025, 0.06, 0.06, 0.01, 0.01, 0.01, 50, 50, 50, 0.3, 0.3, 0.3])
-    gains = both.freeze(q, np.append(noise, [0.0, 0.0, 5.0]))
+    sensors, forces = (0.03, 0.03, 0.0025, 0.06, 0.06), (50.0, 50.0, 50.0)
+    noise = NoiseModel(sensors, (0.01, 0.01, 0.01), forces, (0.3, 0.3, 0.3)).vector()
+    gains = both.freeze(q, noise)
     columns = [front, load, size]
     cost, descent, information = both.normal_equations(q, gains, columns)
     assert cost == pytest.approx(both.half_sum_of_squares(q, gains))

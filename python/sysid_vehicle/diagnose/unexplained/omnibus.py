@@ -255,19 +255,20 @@ class Unknown:
         return section.rows(work, "unknown")
 
     def foreseen(self, problem: _core.Problem) -> tuple[FloatArray, FloatArray]:
-        """Speed and yaw rate as the filter foresaw them; where it had just begun, as it has them.
+        """Speed and yaw rate as the filter foresaw them; where it had just begun, from there.
 
         Each prediction is read as long as the next one has not got so far.
         """
         fit, driving = self.evidence.fit, self.evidence.driving
-        p, noise = fit.model.vector(), fit.noise.vector()
         least = max(round(_FORESEEN_S * driving.mean_rate_hz), 1)
         asked = [(least + i, least) for i in range(least)]
-        state = problem.trace(p, noise, False)["state"][:, [0, 2]]
-        ahead = problem.look_ahead(p, noise, asked, True)[:, :, [0, 2]]
+        asked += [(i, driving.samples) for i in range(1, least)]
+        ahead = problem.look_ahead(fit.model.vector(), fit.noise.vector(), asked, True)
         known = np.isfinite(ahead)
-        motion = np.where(known.any(0), np.where(known, ahead, 0.0).sum(0), state)
-        return as_float64(motion[:, 0]), as_float64(motion[:, 1])
+        motion = np.where(known, ahead, 0.0).sum(0)
+        begins = np.flatnonzero(~known[:, :, 0].any(0))  # of stretches, which nothing foresees
+        motion[begins] = motion[np.minimum(begins + 1, len(motion) - 1)]
+        return as_float64(motion[:, 0]), as_float64(motion[:, 2])
 
     def signals(self, problem: _core.Problem, at: slice) -> FloatArray:
         """Signals of some samples as columns."""
