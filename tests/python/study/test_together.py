@@ -120,7 +120,7 @@ def test_of_several_lags_none_is_no_begin(
     )
     below, asked = SimpleNamespace(log_likelihood=-9.0), []
 
-    def refitting(model: Model, *_: object) -> Any:
+    def refitting(model: Model, *_: object, **__: object) -> Any:
         asked.append(model.value("gyro_bias.bias_radps"))
         return below
 
