@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 
@@ -80,6 +81,14 @@ class NoiseModel:
     def coloured(self) -> bool:
         """Whether noise of sensors is correlated in time."""
         return any(self.colour)
+
+    @property
+    def reading(self) -> tuple[float, ...]:
+        """Standard deviations of all noise of the sensors, white and coloured, as `sensor`."""
+        coloured = dict(zip(COLOURED, self.colour, strict=True))
+        return tuple(
+            math.hypot(s, coloured.get(c, 0.0)) for c, s in zip(MEASURED, self.sensor, strict=True)
+        )
 
     def vector(self) -> FloatArray:
         """In the core's order."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from .._common.text import html_table, number, unit_after
 from ..estimate import UNITS
+from ..estimate.noise import COLOURED
 from ..model import Model
 from ..study import LATERAL, Study, events, open_effects
 from . import figures
@@ -201,12 +202,16 @@ def _remains(study: Study, samples: Samples | None, truth: Model | None) -> list
         for c, s in zip(UNITS, noise.sensor, strict=True)
         if c in study.fit.driving.present
     ]
+    coloured = zip(COLOURED, noise.colour, noise.colour_time_s, strict=True)
+    sensors += [
+        [f"{c}, over {number(t, 2)} s", number(s, 3), UNITS[c]] for c, s, t in coloured if s
+    ]
     x, y, moment = noise.disturbance
     parts = [
         *map(paragraph, (*events(study), study.in_the_end)),
         *([] if samples is None else [figures.residuals(study, samples, _RUNNING)]),
         heading("Noise model", 3),
-        table(("sensor", "white noise", "unit"), sensors),
+        table(("sensor", "noise", "unit"), sensors),
         paragraph(
             "Beyond its equations the final model still needs a disturbance force of "
             f"{number(x, 2)} N forward and {number(y, 2)} N sideways and a yaw moment of "

@@ -45,6 +45,8 @@ def test_the_core_vector_keeps_every_number() -> None:
     assert coloured.floor().colour == coloured.colour
     assert "ay_mps2, coloured 0.1 m/s2, correlation time 0.3 s" in str(coloured)
     assert "ax_mps2, coloured" not in str(coloured)
+    assert coloured.reading[4] == pytest.approx(np.hypot(0.5, 0.1))
+    assert coloured.reading[:2] == SOME.sensor[:2]
 
 
 def test_one_correlation_time_stands_for_three() -> None:

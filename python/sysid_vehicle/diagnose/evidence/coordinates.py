@@ -98,7 +98,7 @@ def that_moved(fit: Fit, driving: Driving, state: FloatArray, std: FloatArray) -
     missed = {
         "vx_mps": v_std,
         "ay_mps2": np.hypot(v * r_std, r * v_std),
-        "ax_mps2": std[:, along] / car.mass_kg if driving.force_known else fit.noise.sensor[3],
+        "ax_mps2": std[:, along] / car.mass_kg if driving.force_known else fit.noise.reading[3],
         "slip_front_rad": np.hypot(side_std, car.lf_m * r_std) / v,
         "slip_rear_rad": np.hypot(side_std, car.lr_m * r_std) / v,
         "yaw_rate_radps": r_std,

@@ -264,7 +264,7 @@ def _blind_noise(driving: Driving, noise: NoiseModel) -> FloatArray:
     That is a share of the motion, and the noise of the sensor, both told by the spread of the
     channel.
     """
-    sensor = np.array(noise.sensor)
+    sensor = np.array(noise.reading)
     spread = np.array(
         [np.std(y[np.isfinite(y)]) if np.isfinite(y).any() else 1.0 for y in driving.measured.T]
     )

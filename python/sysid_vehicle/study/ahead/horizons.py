@@ -170,7 +170,7 @@ def horizons(
     )
     with np.errstate(invalid="ignore"):
         low, middle, high = (_quantile(by_block, q) for q in (0.1, 0.5, 0.9))
-    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in channels])
+    sensor = np.array([noise.reading[MEASURED.index(c)] for c in channels])
     return Horizons(
         tuple(steps), tuple(horizons_s), channels, middle, low, high, as_float64(sensor)
     )
@@ -223,7 +223,7 @@ def squares_ahead(
     prediction. Of these some may be counted alone, (horizons, samples), by where they end.
     """
     noise, ahead = fits[-1].noise.floor(), tuple(horizons_s)
-    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in PREDICTED])
+    sensor = np.array([noise.reading[MEASURED.index(c)] for c in PREDICTED])
     squares = np.stack([_errors_of(f, noise, driving, ahead, counted) for f in fits]) ** 2
     seen = np.isfinite(squares).any(axis=(0, 1))
     seen &= np.isin(PREDICTED, explainable(driving))

@@ -221,7 +221,7 @@ def shares(
     long = np.array(horizons_s) >= _LONG_S
     scale = middle[0, 0][long]
     whole = np.nansum(middle[:, :, long] / np.where(scale > 0.0, scale, np.nan), axis=(2, 3))
-    sensor = np.array([*(noise.sensor[MEASURED.index(c)] for c in channels[:-1]), np.nan])
+    sensor = np.array([*(noise.reading[MEASURED.index(c)] for c in channels[:-1]), np.nan])
     return Shares(
         channels,
         tuple(map(float, horizons_s)),

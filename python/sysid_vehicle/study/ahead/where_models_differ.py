@@ -79,7 +79,7 @@ def apart(
         means = np.where(count > 0.0, found / count, np.nan)
     squares = lost_as_large(as_float64(means.swapaxes(1, 2)))
     seen = np.isfinite(squares).any(axis=(0, 1))
-    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in asked]) ** 2
+    sensor = np.array([noise.reading[MEASURED.index(c)] for c in asked]) ** 2
     return Apart(
         as_float64(squares[:, :, seen]),
         as_float64(np.broadcast_to(sensor, seen.shape)[seen]),
