@@ -4,7 +4,8 @@
 
 Motorways, country roads and towns of one to two and a half minutes, on level ground or on hills and
 crossfalls of 0.015 rad, with and without pushes of the road; a driver who holds path and speed.
-With `--against` the same with the package of another tree, in a process of its own.
+With `--against` the same with the package of another tree that has `usual_road`, in a process of
+its own.
 """
 
 from __future__ import annotations

@@ -195,8 +195,8 @@ def refit(
 ) -> Fit:
     """Parameters alone, from a model's values, under a noise model that stays as it is.
 
-    The likelihood is never lower than that of the values it starts from. What the effects `scanned`
-    have that is scanned is tried at many values. `inputs` as for `refine`.
+    The likelihood is never lower than that of the values it starts from. The times of changes
+    that the effects `scanned` have are tried at many values. `inputs` as for `refine`.
     """
     objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
     tried = scans(model, scanned, driving)

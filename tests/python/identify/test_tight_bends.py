@@ -113,3 +113,25 @@ def test_a_road_car_whose_log_begins_in_a_bend(kind: RoadKind, seed: int) -> Non
         problem = driving.problem(model)
         state = problem.trace(model.vector(), noise.vector(), False)["state"]
         assert np.abs(state[:, 1] - log["vy_mps"][part]).max() < 0.3
+
+
+def test_where_it_begins_depends_on_the_tyres_and_derivatives_know_it() -> None:
+    model = Model(example_vehicle())
+    log = drive(model, usual_road("town", 60.0, 11), seed=11, rate_hz=50.0)
+    k = int(np.argmax(np.abs(log["ay_mps2"])))
+    columns = {c: log[c][k : k + 100] for c in log.channels if c != "vy_mps"}
+    problem = Driving.of(Log.from_arrays(columns, check=False)).problem(model)
+    noise = NoiseModel(
+        (0.03, 0.03, 0.0025, 0.06, 0.06), (0.005, 0.005, 0.001), (50.0, 50.0, 50.0), 0.3
+    )
+    p, names = model.vector(), ("B_rear", "C_rear", "D_rear")
+    gains = problem.freeze(p, noise.vector())
+    places = [model.parameters[n].column for n in names]
+    found = problem.sensitivities(p, gains, places)
+    for column, place in zip(found.T, places, strict=True):
+        step = np.zeros_like(p)
+        step[place] = 1e-5 * p[place]
+        ends = (problem.residuals(q, gains).ravel() for q in (p - step, p + step))
+        difference = (next(ends) - next(ends)) / (2.0 * step[place])
+        assert np.abs(difference[:15]).max() > 0.5  # of the first samples
+        np.testing.assert_allclose(column, difference, atol=1e-6)

@@ -1,18 +1,18 @@
-"""Parameters under noise that stays as it is; what is scanned is tried at many values.
+"""Parameters under noise that stays as it is; the time of a change is tried at many values.
 
-When something changes, and how quickly it answers, has likelihoods with several tops: between two
-bends no time is likelier than another, and no slope leads a search across.
+When something changes has a likelihood with several tops: between two bends no time is likelier
+than another, and no slope leads a search across. How quickly a car answers has one: searches from
+either end of the usual time constants and frequencies meet.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..._common.arrays import FloatArray, as_float64
+from ..._common.arrays import FloatArray
 from ...effects import Effect
 from ...estimate import Driving
 from ...model import Model
@@ -22,53 +22,27 @@ from .settle import moved
 
 _ENOUGH = 0.05  # nats: a round that gains less is the last one
 _VALUES, _CLOSER = 48, 8  # tried at first, and between the neighbours of the best
-# From so near a search finds the time of a change, which takes about a second, and a frequency.
-_NEAR_S, _NEAR_RATIO = 0.5, 1.1
-_BEYOND = 2.0  # times the largest typical value, and the smallest by it
+_NEAR_S = 0.5  # from so near a search finds the time of a change, which takes about a second
 
 
-@dataclass(frozen=True)
-class Scan:
-    """A parameter that is tried at many values.
-
-    Attributes
-    ----------
-    column : int
-        Its place among all parameters.
-    low, high : float
-        Between which.
-    ratio : bool
-        Whether values stand in equal ratios, or at equal distances.
-    """
+class Scan(NamedTuple):
+    """A time that is tried at many values: its place among all parameters, and between which."""
 
     column: int
-    low: float
-    high: float
-    ratio: bool
-
-    def values(self, low: float, high: float, count: int) -> FloatArray:
-        """So many values between two others."""
-        spaced = np.geomspace if self.ratio else np.linspace
-        return as_float64(spaced(low, high, count + 2)[1:-1])
-
-    def is_near(self, low: float, high: float) -> bool:
-        """Whether a search finds the best of what lies between."""
-        return high < _NEAR_RATIO**2 * low if self.ratio else high - low < 2.0 * _NEAR_S
+    low_s: float
+    high_s: float
 
 
 def scans(model: Model, effects: Sequence[Effect], driving: Driving) -> tuple[Scan, ...]:
-    """Of the free parameters of these effects those that are scanned."""
+    """Of the free parameters of these effects those that are times within a log."""
     found = []
     for e in effects:
         p = e.scanned
-        if p is not None and f"{e.id}.{p.name}" in model.free_names:
+        if p is not None and p.scan == "time" and f"{e.id}.{p.name}" in model.free_names:
             low, high = model.bounds(f"{e.id}.{p.name}")
-            if p.scan == "time":
-                low, high = max(low, 0.0), min(high, longest_s(driving))
-            else:
-                low, high = max(low, p.typical_low / _BEYOND), min(high, p.typical_high * _BEYOND)
-            if low < high:
-                found.append(Scan(p.column, low, high, p.scan != "time"))
+            scan = Scan(p.column, max(low, 0.0), min(high, longest_s(driving)))
+            if scan.low_s < scan.high_s:
+                found.append(scan)
     return tuple(found)
 
 
@@ -86,7 +60,7 @@ def go_on(
 ) -> tuple[FloatArray, Any]:
     """Where a search from the model's values ends, and the gains of the filter there.
 
-    It begins anew at likelier values of what is scanned for as long as that gains anything.
+    It begins anew at likelier times for as long as that gains anything.
     """
     box = free_box(model)
     p, gains, value = box.inside(model.vector()), None, -np.inf
@@ -107,18 +81,19 @@ def go_on(
 
 
 def _likeliest(objective: Objective, scan: Scan, p: FloatArray, noise: FloatArray) -> FloatArray:
-    """The parameters with the likeliest value of the one that is scanned."""
-    tried = scan.values(scan.low, scan.high, _VALUES)
+    """The parameters with the likeliest time."""
+    low, high, count = scan.low_s, scan.high_s, _VALUES
     while True:
-        sets = np.repeat(p[None, :], 1 + len(tried), axis=0)
+        tried = np.linspace(low, high, count + 2)[1:-1]
+        sets = np.repeat(p[None, :], 1 + count, axis=0)
         sets[1:, scan.column] = tried
         told = objective.log_likelihoods(sets, noise)
         best = int(np.argmax(told))
         if told[best] > told[0] + _ENOUGH:
             p = sets[best]
         k = int(np.argmin(np.abs(tried - p[scan.column])))
-        low = tried[k - 1] if k > 0 else scan.low
-        high = tried[k + 1] if k + 1 < len(tried) else scan.high
-        if scan.is_near(low, high):
+        low = tried[k - 1] if k > 0 else low
+        high = tried[k + 1] if k + 1 < count else high
+        if high - low < 2.0 * _NEAR_S:
             return p
-        tried = scan.values(low, high, _CLOSER)
+        count = _CLOSER
