@@ -21,6 +21,7 @@ from ..rules import USUAL, Rules, bic
 from .candidates.candidate import Candidate
 from .candidates.clocks import shifts
 from .candidates.diagnosis import Diagnosis
+from .candidates.on_the_level import may_be_the_drivers
 from .candidates.possible import beside_what_they_refine, considered
 from .candidates.posterior import causes_of
 from .candidates.refitting import Refitting
@@ -136,7 +137,7 @@ def diagnose(
             left,
             rules,
             board.scores,
-            family,
+            family | {c.id: c.p_value for c in told if may_be_the_drivers(c, fit)},
             proposed=proposed,
             unfollowed=unfollowed,
         )
@@ -178,12 +179,18 @@ def _told(
 ) -> tuple[Candidate, ...]:
     """All candidates, those with noise of their own first, with what cannot be told from each."""
     samples = by.driving.samples
+    finished, far = ([_proven(c, by.fit) for c in some] for some in (finished, far))
     likeliest_first = sorted(finished, key=lambda c: -_merit(c, samples))
     best = with_refit_rivals(likeliest_first, far, by.driving, by.rules, by.pool, by.ends)
     done = {c.id for c in best}
     poorer = [c for c in far if c.id not in done]
     done |= {c.id for c in poorer}
     return (*best, *poorer, *(c for c in ranked if c.id not in done))
+
+
+def _proven(c: Candidate, before: Fit) -> Candidate:
+    """The candidate, without evidence where that may be none of it."""
+    return replace(c, p_value=1.0) if may_be_the_drivers(c, before) else c
 
 
 def _with_errors(dx: Diagnosis) -> Diagnosis:

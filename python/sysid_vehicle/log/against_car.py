@@ -168,13 +168,19 @@ def _driven(motion: Motion, wheelbase_m: float) -> Drive | None:
 
 
 def _mass(drive: Drive, mass_kg: float) -> _Told | None:
-    """Mass of the vehicle file over that of the log, ``dv/dt = F / m - ...``."""
+    """Mass of the vehicle file over that of the log, ``dv/dt = F / m - ...``.
+
+    Whoever holds a speed answers slopes with the force, which then moves the car less than its mass
+    asks for. The inverse lies between that of the regression and that of force on acceleration
+    (Klepper & Leamer, Econometrica 52 (1984)).
+    """
     ramp, force, found = ramp_on(drive, "fx_n")
     inverse = float(found.coefficients[0])
     if spread_of(ramp) < EXCITED or found.coherence < _COHERENT or inverse <= 0.0:
         return None
     ratio, deviation = mass_kg * inverse, _SURE * float(found.deviations[0]) / inverse
-    return _Told(ratio, ratio / (1.0 + deviation), ratio * (1.0 + deviation), drive.place(force))
+    low, high = ratio / (1.0 + deviation), ratio * (1.0 + deviation)
+    return _Told(ratio, low, high / found.coherence, drive.place(force))
 
 
 def _refuse_without_brakes(log: Log, drive: Drive, mass_kg: float) -> None:

@@ -4,8 +4,21 @@ from dataclasses import replace
 
 import pytest
 
-from sysid_vehicle import Fit, Model, RoadDisturbance, diagnose, drive, identify, manoeuvres
-from sysid_vehicle.diagnose.candidates.on_the_level import needs_road, shown_on_the_level
+from sysid_vehicle import (
+    Fit,
+    Model,
+    RoadDisturbance,
+    diagnose,
+    drive,
+    identify,
+    manoeuvres,
+    verdicts,
+)
+from sysid_vehicle.diagnose.candidates.on_the_level import (
+    may_be_the_drivers,
+    needs_road,
+    shown_on_the_level,
+)
 from sysid_vehicle.identify import refine, refit
 from sysid_vehicle.rules import USUAL
 
@@ -68,3 +81,33 @@ def test_where_the_lean_is_in_the_model_no_road_hides_it(on_a_road: Fit) -> None
     fit = refine(with_it.fit.model, on_a_road.driving, with_it.fit.noise)
     shown = shown_on_the_level(fit, fit.driving, diagnose(fit, refits=0).ranking, USUAL)
     assert not {"accelerometer_scale", "gyro_scale"} & {c.id for c in shown}
+
+
+@pytest.fixture(scope="module")
+def among_hills(truth: Model, start: Model) -> Fit:
+    """The complete car, whose driver answers slopes before the speed sensor shows them."""
+    country = manoeuvres.usual_road("country", 60.0, seed=1)
+    road = RoadDisturbance(slope_rad=0.02)
+    log = drive(truth, country, seed=1, rate_hz=50.0, disturbance=road)
+    return identify(start, log.without("vy_mps"), starts=1)
+
+
+def test_what_the_driver_knows_of_slopes_is_no_late_sensor(among_hills: Fit) -> None:
+    assert among_hills.noise.road[0] > 0.1
+    dx = diagnose(among_hills)
+    late = next(c for c in dx.ranking if c.id == "sensor_delay")
+    assert late.fit is not None  # it was refitted, and gained what only a late speed seems to gain
+    assert late.statistic > 20.0
+    assert may_be_the_drivers(late, among_hills)
+    assert not dx.significant
+    assert verdicts(dx)["sensor_delay"].finding == "not testable"
+
+
+def test_late_speeds_are_found_where_the_ground_is_level(truth: Model, start: Model) -> None:
+    late = truth.add("sensor_delay").with_values({"sensor_delay.speeds_s": 0.12})
+    log = drive(late, manoeuvres.lap(40.0), seed=7, rate_hz=50.0).without("vy_mps")
+    fit = identify(start, log, starts=1)
+    assert fit.noise.road[0] > 0.05  # slopes that are not there take up the delay
+    found = diagnose(fit).significant[0]
+    assert found.id == "sensor_delay"
+    assert not may_be_the_drivers(found, fit)

@@ -55,3 +55,16 @@ def shown_on_the_level(
 def needs_road(fit: Fit, before: Fit) -> bool:
     """Whether a fit keeps the greater part of the road that another one has."""
     return math.hypot(*fit.noise.road) > _MOST * math.hypot(*before.noise.road)
+
+
+def may_be_the_drivers(c: Candidate, before: Fit) -> bool:
+    """Whether the late speeds of a refitted candidate may be what the driver knows of slopes.
+
+    Whoever holds a speed knows it better than its sensor does, and answers slopes with the pull:
+    the pull then tells of the speed what no reading has told yet, as if the readings came late. A
+    delay that is there takes the place of slopes that are not; beside slopes that stay, nothing but
+    a lateral speed tells whether the speeds come late.
+    """
+    if c.fit is None or c.effect.breaks != "readings late" or "vy_mps" in c.fit.driving.present:
+        return False
+    return c.fit.noise.road[0] > _MOST * before.noise.road[0]
