@@ -137,7 +137,7 @@ def diagnose(
             left,
             rules,
             board.scores,
-            family | {c.id: c.p_value for c in told if may_be_the_drivers(c, fit)},
+            family | {c.id: max(c.p_value, family[c.id]) for c in told if c.fit is not None},
             proposed=proposed,
             unfollowed=unfollowed,
         )

@@ -28,6 +28,7 @@ from sysid_vehicle.diagnose.candidates.refits import (
     refitted,
 )
 from sysid_vehicle.diagnose.candidates.refitting import Refitting, _hidden_by_tyres
+from sysid_vehicle.diagnose.candidates.score import ScoreBoard
 from sysid_vehicle.effects import catalogue
 from sysid_vehicle.identify import refit, with_exact_inputs
 from sysid_vehicle.identify.search.objective import Objective
@@ -95,9 +96,10 @@ def test_a_lag_that_is_not_there_is_not_found(complete_fits: tuple[Fit, ...]) ->
 def test_a_refit_is_never_worse_than_the_model_that_it_contains(fine_fit: Fit) -> None:
     """Precise sensors tell a tenth of a typical delay from none by hundreds of nats."""
     fit = fine_fit
-    one = replace(scored(fit, "sensor_delay"), value=(0.06, 0.02))
+    one = replace(scored(fit, "sensor_delay"), value=(0.06, 0.02), p_value=1e-9)
     found = refitted(fit, fit.driving, one)
     assert found.statistic == 0.0
+    assert found.p_value == 1.0  # what the score told is refuted
     assert found.fit is not None
     assert found.fit.log_likelihood == pytest.approx(fit.log_likelihood, abs=1e-6)
     assert found.value == (0.0, 0.0)
@@ -217,3 +219,13 @@ def test_what_refines_an_effect_of_the_model_is_refitted_whatever_leads(
     diagnose(lean, refits=1)
     diagnose(lean, candidates=["aero_drag"], refits=1)
     assert asked == [{"aero_drag"}, {"aero_drag", "body_roll"}, {"body_roll"}, set()]
+
+
+def test_a_score_that_the_refit_refutes_is_no_evidence(
+    fine_fit: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = "sensor_delay"
+    monkeypatch.setattr(ScoreBoard, "family_p_values", lambda _, **__: {name: 1e-6})
+    dx = diagnose(fine_fit, candidates=[name])
+    assert dx.family[name] == 1.0
+    assert not dx.significant

@@ -32,6 +32,7 @@ def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
 
     Its statistic is what that gains over `fit`, twice the log-likelihood; 0 where the model fails.
     It is never worse than the model that it contains: where no search is better, it is that one.
+    Then the score is no evidence: it knows the effect to first order, and the likelihood exactly.
     """
     best: Fit | None = None
     for values in (*_starts(c), {}):
@@ -51,7 +52,7 @@ def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
         return replace(c, statistic=0.0)
     if best.log_likelihood < fit.log_likelihood:
         contained = unmoved(fit.model.add(c.effect), driving, fit.noise)
-        return replace(_with_fit(fit, c, contained), statistic=0.0)
+        return replace(_with_fit(fit, c, contained), statistic=0.0, p_value=1.0)
     return _with_fit(fit, c, best)
 
 
