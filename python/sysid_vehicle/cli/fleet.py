@@ -47,5 +47,9 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     )
     print(fleet)
     print(f"Report: {args.out / 'report.html'}")
-    if fleet.failed and not fleet.done:
-        raise InvalidInput(f"none of the {len(fleet.failed)} studies could be done")
+    if fleet.failed:  # said with a status of its own: scripts do not read what was printed
+        every = len(fleet.failed) + len(fleet.done)
+        raise InvalidInput(
+            f"{len(fleet.failed)} of {every} studies failed; mend what is said of each, or "
+            "try them again with --retry"
+        )

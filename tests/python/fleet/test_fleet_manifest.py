@@ -1,6 +1,7 @@
 """Which studies are asked for: arguments and manifests that make sense, and that make none."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -144,7 +145,7 @@ def test_effects_are_named_once_those_of_files_are_known(
     assert asked("wind_of_a_flet").startswith(
         "sysid-vehicle: error: no effect is called 'wind_of_a_flet' (did you mean 'wind_of_a_fleet'"
     )
-    assert asked("wind_of_a_fleet").endswith("none of the 1 studies could be done")
+    assert "error: 1 of 1 studies failed; " in asked("wind_of_a_fleet")
 
 
 def test_a_fleet_of_which_nothing_could_be_done_is_no_success(
@@ -156,4 +157,18 @@ def test_a_fleet_of_which_nothing_could_be_done_is_no_success(
     out, err = capsys.readouterr()
     assert "Failed: a/one: " in out
     assert (tmp_path / "report.html").exists()
-    assert err.splitlines()[-1] == "sysid-vehicle: error: none of the 4 studies could be done"
+    assert err.splitlines()[-1].startswith("sysid-vehicle: error: 4 of 4 studies failed; ")
+
+
+def test_one_study_that_failed_shows_in_the_status(
+    garage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Scripts do not read what was printed."""
+    asked = ["improve-many", str(garage / "fleet.toml"), "--out", str(tmp_path)]
+    good, bad = SimpleNamespace(failure=""), SimpleNamespace(failure="no steer_rad")
+    for rows, status in (((good, good), 0), ((good, bad), 2)):
+        fleet = SimpleNamespace(
+            done=[r for r in rows if not r.failure], failed=[r for r in rows if r.failure]
+        )
+        monkeypatch.setattr("sysid_vehicle.cli.fleet.improve_all", lambda *_, f=fleet, **__: f)
+        assert main(asked) == status
