@@ -94,7 +94,8 @@ class SideslipRun(Told):
     nis, observed, log_likelihood : ndarray
         Squared whitened innovation, readings it is made of, log density of the readings.
     mode : ndarray
-        0 running, 1 holding (too slow), 2 coasting (a sensor is missing or refused).
+        0 running, 1 holding (too slow), 2 coasting (a sensor is missing or refused; not where a
+        slower one has no reading yet).
     """
 
     kind: str
