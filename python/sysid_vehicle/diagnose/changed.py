@@ -14,13 +14,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from .._common.text import few
 from .._common.typed import typed
 from ..effects import Effect
-from ..errors import InvalidInput
+from ..errors import InvalidInput, warn
 from ..estimate import Driving
 from ..identify import Fit, explaining, identify
 from ..identify.offsets import centred
-from ..log import Log
+from ..log import Log, copies
 from ..model import Model
 from ..rules import USUAL, Rules
 from ..vehicle import Vehicle
@@ -77,6 +78,11 @@ def changed(
         The wheel force is known in one of the drivings only, or the fit is one to predictions.
     NumericalError
         The model of the reference cannot be evaluated on the later driving.
+
+    Warns
+    -----
+    SysidWarning
+        A log is of the reference and of the later driving, with one vehicle file.
     """
     if before.horizon_s:
         raise InvalidInput(
@@ -92,6 +98,10 @@ def changed(
             "the wheel force fx_n is known in one of the drivings only; log it in both, or leave "
             "it out of both"
         )
+    another = vehicle is not None and vehicle != before.model.vehicle
+    if (both := copies(driving.logs, before.driving.logs)) and not another:
+        told = "of the reference and of the later driving, and with itself nothing has changed"
+        warn(f"{few(both)} {'is' if len(both) == 1 else 'are'} {told}")
     lacks: list[str] = []
     while True:
         search = Search(before, _later(before, driving, vehicle), candidates, rules)

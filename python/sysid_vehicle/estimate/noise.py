@@ -30,6 +30,9 @@ COLOURED = ("yaw_rate_radps", "ax_mps2", "ay_mps2")
 """Channels whose sensors may have noise with a correlation time beside the white one."""
 
 
+_LEAST_TRIED = ", the least that is tried: what the model leaves unexplained stands for the rest"
+
+
 @dataclass(frozen=True)
 class NoiseModel:
     """Standard deviations of sensor noise and of what disturbs the motion.
@@ -135,8 +138,8 @@ class NoiseModel:
     def text(self, measured: Container[str] = MEASURED) -> str:
         """In words; of sensors that there are not it has a number that means nothing."""
         lines = [
-            f"  {c:15s} {s:10.3g} {UNITS[c]}"
-            for c, s in zip(MEASURED, self.sensor, strict=True)
+            f"  {c:15s} {s:10.3g} {UNITS[c]}{_LEAST_TRIED if s <= 1.001 * least else ''}"
+            for c, s, least in zip(MEASURED, self.sensor, _SMALLEST.tolist(), strict=True)
             if c in measured
         ]
         force_x, force_y, moment = self.disturbance

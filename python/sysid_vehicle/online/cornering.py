@@ -6,10 +6,12 @@ Where the slip angles are known, lateral and yaw acceleration are linear in the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from .. import _core
@@ -242,9 +244,16 @@ def cornering_stiffness(
     rate, vx = log["yaw_rate_radps"], log["vx_mps"]
     vx = np.where(vx > _SLOWEST_MPS, vx, np.nan)
     slips = slip_angles(vehicle.lf_m, vehicle.lr_m, log["steer_rad"], 1.0, np.tan(beta), rate / vx)
-    drift, turn = white_noise_std(beta, NOISE_BLOCK), white_noise_std(rate, NOISE_BLOCK) / vx
+    # At a standstill the angle of noise is anything: that of the speed is what the sensor has.
+    drift: float | FloatArray = white_noise_std(np.where(vx > 0.0, beta, np.nan), NOISE_BLOCK)
+    if beta_rad is None:
+        drift = white_noise_std(log["vy_mps"], NOISE_BLOCK) / vx
+    turn = white_noise_std(rate, NOISE_BLOCK) / vx
     noises = [np.hypot(drift, arm * turn) for arm in (vehicle.lf_m, vehicle.lr_m)]
     noises[0] = np.hypot(noises[0], white_noise_std(log["steer_rad"], NOISE_BLOCK))
+    ay_std = settings.get("ay_std_mps2", _AY_STD_MPS2)
+    clear = _clear(vehicle, slips, noises, ay_std)
+    slips = np.where(clear, slips[0], np.nan), np.where(clear, slips[1], np.nan)
     if window_s is None:
         window_s = max(
             _window_s(slip, noise, log.rate_hz) for slip, noise in zip(slips, noises, strict=True)
@@ -266,7 +275,7 @@ def cornering_stiffness(
     cf, cr, cf_std, cr_std, used = found
     # Noise of the slips, which both axles share, times the stiffness is one of the readings.
     felt = (cf * noises[0] + cr * noises[1]) / vehicle.mass_kg
-    louder = np.hypot(1.0, _root_mean(felt, used) / settings.get("ay_std_mps2", _AY_STD_MPS2))
+    louder = np.hypot(1.0, _root_mean(felt, used) / ay_std)
     both = []
     for tyre, slip, noise, c, std in (
         (vehicle.tyre_front, readings[:, 0], noises[0], cf, cf_std),
@@ -294,6 +303,26 @@ def cornering_stiffness(
                 f"angles are noise"
             )
     return run
+
+
+def _clear(
+    vehicle: Vehicle, slips: Sequence[FloatArray], noises: Sequence[FloatArray], ay_std: float
+) -> npt.NDArray[np.bool_]:
+    """Samples that together tell the stiffnesses best by least squares, which weigh all alike.
+
+    Slip angles of a car that parks are noise: more samples would then tell less. The variance of
+    the regression has its least where all samples from some size of this noise on are left out.
+    """
+    felt = [c / vehicle.mass_kg for c in static_stiffness(vehicle)]
+    noise = (felt[0] * noises[0] + felt[1] * noises[1]) ** 2
+    told = (felt[0] * slips[0]) ** 2 + (felt[1] * slips[1]) ** 2
+    order = np.argsort(noise)
+    order = order[np.isfinite((noise + told)[order])]
+    if order.size == 0:
+        return np.isfinite(noise)
+    summed = np.maximum(np.cumsum(told[order]), 1e-12)
+    variance = np.cumsum(told[order] * (ay_std**2 + noise[order])) / summed**2
+    return np.asarray(noise <= noise[order][np.argmin(variance)])
 
 
 def _bent(tyre: Tyre, slip_rad: FloatArray, used: FloatArray) -> FloatArray:

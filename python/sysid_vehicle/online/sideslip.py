@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from .. import _core
 from .._common.arrays import FloatArray, as_float64
@@ -284,7 +285,10 @@ def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -
     """Run an observer over a whole log."""
     sensors = np.column_stack([log[name] for name in _SENSORS])
     dt = np.full(log.n, 1.0 / log.rate_hz)
-    found = SideslipEstimate._make(observer.run(dt, sensors).T)
+    columns = observer.run(dt, sensors).T.copy()
+    mode = columns[SideslipEstimate._fields.index("mode")]
+    mode[_between_readings(sensors) & (mode == 2)] = 0.0
+    found = SideslipEstimate._make(columns)
     true_beta = true_std = None
     if log.has("vy_mps"):
         true_beta = np.arctan2(log["vy_mps"], log["vx_mps"])
@@ -304,6 +308,20 @@ def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -
             f"and go_above_mps of the settings"
         )
     return run
+
+
+def _between_readings(sensors: FloatArray) -> npt.NDArray[np.bool_]:
+    """Samples in which sensors that are slower than the log, and none else, have no reading."""
+    n = len(sensors)
+    missing = ~np.isfinite(sensors)
+    between = np.asarray(missing.any(axis=1))
+    for column in missing.T:
+        there = np.flatnonzero(~column)
+        if there.size < n:
+            period = float(np.median(np.diff(there))) if there.size > 1 else 1.0
+            since = np.arange(n) - np.maximum.accumulate(np.where(column, -n, np.arange(n)))
+            between = np.asarray(between & (~column | ((since <= period) & (period > 1.0))))
+    return between
 
 
 def static_stiffness(vehicle: Vehicle) -> tuple[float, float]:

@@ -94,7 +94,8 @@ class SideslipRun(Told):
     nis, observed, log_likelihood : ndarray
         Squared whitened innovation, readings it is made of, log density of the readings.
     mode : ndarray
-        0 running, 1 holding (too slow), 2 coasting (a sensor is missing or refused).
+        0 running, 1 holding (too slow), 2 coasting (a sensor is missing or refused; not where a
+        slower one has no reading yet).
     """
 
     kind: str
@@ -134,16 +135,17 @@ class SideslipRun(Told):
 
     @property
     def used_friction(self) -> FloatArray:
-        """Side force of the front and the rear axle over their load at rest, as far as it went.
+        """Side force of the front and the rear axle over the load on it, as far as it went.
 
-        One in a hundred samples, which may be noise, is larger.
+        One in a hundred samples, which may be noise, is larger. The loads move with the
+        longitudinal force, as those of the observer do.
         """
-        forces = np.abs(np.stack([self.fyf_n, self.fyr_n]))[:, self.mode == 0]
-        if not np.isfinite(forces).any(axis=1).all():
+        moved = self.fx_n * (self.vehicle.cg_height_m / self.vehicle.wheelbase_m)
+        loads = np.reshape(self.vehicle.static_loads_n, (2, 1)) + np.stack([-moved, moved])
+        used = np.abs(np.stack([self.fyf_n, self.fyr_n]) / loads)[:, self.mode == 0]
+        if not np.isfinite(used).any(axis=1).all():
             return np.zeros(2)
-        return np.asarray(
-            np.nanquantile(forces, 1.0 - _RARELY, axis=1) / self.vehicle.static_loads_n
-        )
+        return np.asarray(np.nanquantile(used, 1.0 - _RARELY, axis=1))
 
     @property
     def vy_mps(self) -> FloatArray:

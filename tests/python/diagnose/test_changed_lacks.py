@@ -67,6 +67,7 @@ def test_what_the_reference_alone_shows_to_be_missing_is_put_in(truth: Model) ->
     assert abs(change["steer_delay"].value[0] - 0.05) < 3.0 * change["steer_delay"].std[0]
 
 
+@pytest.mark.filterwarnings("ignore:lap is of the reference")  # enough for what is asked here
 @pytest.mark.parametrize("nothing", [0.0, 0.5])
 def test_it_is_asked_for_before_the_search_where_something_changed(
     truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, nothing: float
@@ -95,6 +96,7 @@ def test_it_is_asked_for_before_the_search_where_something_changed(
     assert change.lacks == (() if nothing else full)
 
 
+@pytest.mark.filterwarnings("ignore:lap is of the reference")  # enough for what is asked here
 @pytest.mark.parametrize("calm", [False, True])
 def test_it_is_put_into_the_model_of_the_reference(
     truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, calm: bool

@@ -9,6 +9,7 @@ from contradictions import contradictions_of_changes
 
 from sysid_vehicle import Change, Fit, Log, Model, changed, load
 from sysid_vehicle._common.text import number
+from sysid_vehicle.errors import SysidWarning
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +23,13 @@ def test_nothing_is_named_where_nothing_changed(none: Change) -> None:
     assert none.unknown == ()
     assert str(none).startswith("no change is shown")
     assert none["steer_offset"].said == "unchanged"
+
+
+def test_a_log_that_is_compared_with_itself_is_told(fit: Fit) -> None:
+    (log,) = fit.driving.logs
+    with pytest.warns(SysidWarning, match=f"{log.name} is of the reference and of the later"):
+        found = changed(fit, log, candidates=["steer_offset"])
+    assert found.named == ()
 
 
 def test_what_changed_is_named_with_its_size(offset: Change) -> None:

@@ -224,3 +224,15 @@ def test_elsewhere_no_model_is_sure_to_less_than_a_thousandth_of_the_weight(trut
     assert y == 2.0 * weight
     assert moment == pytest.approx(1e-3 * weight * truth.vehicle.wheelbase_m / 4.0)
     assert quiet.elsewhere(truth.vehicle).sensor == SOME.sensor
+
+
+def test_noise_that_ends_at_the_least_that_is_tried_is_no_finding() -> None:
+    """Of a kart that lacked relaxation 0.005 m/s2 were told, a tenth of its sensor's."""
+    noise = NoiseModel(
+        (0.03, 0.03, 0.0025, 0.06, 5e-3 * (1.0 + 1e-9)), (0.0,) * 3, (9.0,) * 3, (0.5,) * 3
+    )
+    told = {line.split()[0]: line for line in noise.text().splitlines()}
+    assert told["ay_mps2"].endswith(
+        "the least that is tried: what the model leaves unexplained stands for the rest"
+    )
+    assert "least" not in told["ax_mps2"]

@@ -68,3 +68,23 @@ def test_a_parameter_at_its_bound_is_named() -> None:
     assert found.cell(0) == "0.80000 at its bound"
     assert "mu_peak rests at its bound 0.8" in found.notes
     assert "bound" not in found.cell(1)
+
+
+@pytest.mark.parametrize(("slip", "readings"), [(0.025, 15), (0.05, 30), (0.08, 50), (0.3, 60)])
+def test_least_squares_say_where_their_interval_does_not_hold(slip: float, readings: int) -> None:
+    """Of usual driving, a seventh of the way to the peak, 0.29 +- 0.07 was told of 0.95."""
+    silent, told = [], []
+    for seed in range(991_400, 991_460):
+        data = online.simulate_mu_slip(
+            (0.95, 0.17), noise_std=0.03, seed=seed, slip=np.linspace(0.002, slip, readings)
+        )
+        e = online.mu_slip_fit(data)
+        if "mu_peak" not in e.at_bound:
+            holds = abs(e.values[0] - 0.95) < 1.96 * e.std[0]
+            (told if "mu_peak" in e.too_narrow else silent).append(holds)
+    if slip > 0.06:
+        assert np.mean(silent) > 0.9
+        assert len(told) < 6
+    else:
+        assert len(told) > 5 * len(silent)
+        assert np.mean(told) < 0.95

@@ -15,6 +15,7 @@ from sysid_vehicle.online import (
     MuSlipFilter,
     SideslipEstimate,
     SideslipObserver,
+    estimate_sideslip,
 )
 from sysid_vehicle.published import PublishedSideslipObserver
 
@@ -294,3 +295,18 @@ def test_the_published_observer_refuses_what_cannot_be(vehicle, dt, sensors):
     missing[4] = np.nan
     with pytest.raises(sv.NumericalError, match=r"ay_mps2 is missing: leave .* dual observer"):
         observer.step(0.01, *missing)
+
+
+def test_a_slower_speed_is_no_sensor_that_is_missing(vehicle, log):
+    """Half of the samples were told to lack a sensor where the speed came at half the rate."""
+    columns = {name: np.array(log[name]) for name in log.channels}
+    columns["vx_mps"][np.arange(log.n) % 2 == 1] = np.nan
+    slower = estimate_sideslip(vehicle, sv.Log.from_arrays(columns, name="slower", check=False))
+    assert (slower.mode[1:-1] == 0).all()
+    assert "missing" not in str(slower)
+    columns["yaw_rate_radps"][1000:1100] = np.nan
+    with pytest.warns(sv.SysidWarning, match="yaw_rate_radps: no values"):
+        log = sv.Log.from_arrays(columns, name="lost", check=False)
+    lost = estimate_sideslip(vehicle, log)
+    assert (lost.mode[1000:1100] == 2).all()
+    assert "% of samples with a sensor missing or refused" in str(lost)

@@ -211,6 +211,18 @@ def test_on_ice_with_tyres_of_a_dry_road_nobody_is_told_that_the_friction_is_kno
     assert told.mu_f[-1] < 0.2
 
 
+def test_friction_is_used_under_the_load_that_braking_moves(vehicle, log):
+    """Of a rear axle more was told to be used than the friction told beside it."""
+    run = estimate_sideslip(vehicle, log)
+    even = dataclasses.replace(run, fx_n=np.zeros(log.n))
+    pushed = dataclasses.replace(run, fx_n=np.full(log.n, 5000.0))
+    front, rear = vehicle.static_loads_n
+    moved = 5000.0 * vehicle.cg_height_m / vehicle.wheelbase_m
+    assert pushed.used_friction == pytest.approx(
+        even.used_friction * (front / (front - moved), rear / (rear + moved))
+    )
+
+
 def test_least_squares_find_the_stiffness_behind_exact_readings(vehicle):
     rng = np.random.default_rng(0)
     alpha = 0.02 * rng.standard_normal((500, 2))

@@ -90,3 +90,39 @@ def test_a_stiffness_that_no_tyre_has_is_told(driven: Columns) -> None:
     with pytest.warns(SysidWarning, match="rear cornering stiffness is -.* which no tyre has"):
         run = cornering_stiffness(CAR, log_of(creeping(driven)))
     assert run.cr_npr[-1] < 0.0
+
+
+@pytest.mark.parametrize("end", ["stands", "parks"])
+def test_what_a_car_does_at_walking_pace_takes_nothing_from_its_stiffness(
+    driven: Columns, end: str
+) -> None:
+    """Noise of the sideslip at a standstill made the stiffness twice as large +- itself."""
+    columns = braked(driven)
+    rng = np.random.default_rng(991_200)
+    standing = np.arange(columns["vx_mps"].size) >= driven["vx_mps"].size
+    columns["vy_mps"] = columns["vy_mps"] + 0.03 * rng.standard_normal(standing.size) * standing
+    if end == "parks":
+        time_s = 0.01 * np.arange(2000)
+        vx, steer = 1.3 + 0.02 * rng.standard_normal(2000), 0.4 * np.sin(0.5 * time_s)
+        rate = np.tan(steer) * 1.3 / CAR.wheelbase_m
+        more = {
+            "vx_mps": vx,
+            "vy_mps": CAR.lr_m * rate + 0.03 * rng.standard_normal(2000),
+            "yaw_rate_radps": rate + 0.003 * rng.standard_normal(2000),
+            "ay_mps2": 1.3 * rate + 0.06 * rng.standard_normal(2000),
+            "steer_rad": steer,
+        }
+        zero = np.zeros(2000)
+        columns = {n: np.append(x, more.get(n, zero)) for n, x in columns.items()}
+        columns["time_s"] = 0.01 * np.arange(columns["vx_mps"].size)
+    run = cornering_stiffness(CAR, log_of(columns))
+    alone = cornering_stiffness(CAR, log_of(driven))
+    for found, std, other, other_std in zip(
+        (run.cf_npr[-1], run.cr_npr[-1]),
+        (run.cf_std_npr[-1], run.cr_std_npr[-1]),
+        (alone.cf_npr[-1], alone.cr_npr[-1]),
+        (alone.cf_std_npr[-1], alone.cr_std_npr[-1]),
+        strict=True,
+    ):
+        assert abs(found - other) < 2.0 * other_std
+        assert std < 1.5 * other_std

@@ -75,3 +75,23 @@ def test_a_clock_that_is_set_while_it_records_is_a_gap(
     found = sv.propose_channels(columns, vehicle=CAR).channels
     as_it_was = sv.propose_channels(driven, vehicle=CAR).channels
     assert {n: c.factor for n, c in found.items()} == {n: c.factor for n, c in as_it_was.items()}
+
+
+@pytest.mark.parametrize("mistake", ["set back to zero", "recorded twice", "wrong order"])
+def test_times_that_go_back_hide_no_steering_wheel(
+    driven: dict[str, np.ndarray], mistake: str
+) -> None:
+    """The map had the factor of road wheels, 15 times too large, and did not say so."""
+    half = driven["time"].size // 2
+    rows = {
+        "set back to zero": slice(None),
+        "recorded twice": np.repeat(np.arange(2 * half), 2),
+        "wrong order": np.r_[half : 2 * half, 0:half],
+    }[mistake]
+    columns = {name: values[rows] for name, values in driven.items()}
+    if mistake == "set back to zero":
+        columns["time"] = np.r_[driven["time"][:half], driven["time"][: -half or None]]
+    columns["steering_wheel_deg"] = np.degrees(15.5 * columns.pop("delta"))
+    steer = sv.propose_channels(columns, vehicle=CAR).channels["steer_rad"]
+    assert "angle of the steering wheel" in steer.why
+    assert 10.0 < np.radians(1.0) / steer.factor < 23.0  # half a lap tells it to a third

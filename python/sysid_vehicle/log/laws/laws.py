@@ -39,6 +39,7 @@ VX_MPH: Slip = ("vx_mps", "miles per hour", "factor = 0.44704")
 _VX_KNOTS: Slip = ("vx_mps", "knots", "factor = 0.5144444")
 _VX_FEET: Slip = ("vx_mps", "feet per second", "factor = 0.3048")
 _VX_WHEEL: Slip = ("vx_mps", "rad/s of a wheel", "factor = the radius of the tyre [m]")
+_TOGETHER = 0.5  # cosine
 _RADIUS_M = 0.31  # of a usual car's tyre
 _RPM = 2.0 * math.pi / 60.0
 _VX_RPM: Slip = ("vx_mps", "rpm of a wheel", "factor = 0.1047198 times the radius of the tyre [m]")
@@ -131,6 +132,11 @@ def cosine(x: FloatArray, y: FloatArray) -> float:
     """Cosine of the angle between two signals, 0 where one is nothing."""
     size = float(np.linalg.norm(x) * np.linalg.norm(y))
     return float(x @ y) / size if size > 0.0 else 0.0
+
+
+def turns_as_steered(speed: FloatArray, steer: FloatArray, yaw_rate: FloatArray) -> bool:
+    """Whether the signs of the three are those of one car, be it one that reverses."""
+    return cosine(steer * speed, yaw_rate) > _TOGETHER
 
 
 def wrong_sign(channel: str, what: str, values: FloatArray, drive: Drive) -> Implausible:

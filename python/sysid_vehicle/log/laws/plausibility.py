@@ -44,6 +44,7 @@ from .laws import (
     fit,
     ones,
     spread_of,
+    turns_as_steered,
     wrong_sign,
 )
 from .longitudinal import check_force, check_longitudinal, held_speed_note
@@ -56,6 +57,10 @@ from .sizes import check_sizes
 from .swapped_speeds import check_swapped_speeds
 from .wheelbase import check_steering, gripping, is_model_car
 
+_REVERSES = (
+    "vx_mps: the car reverses for most of the drive, and turns as it is steered; slip angles of a "
+    "single-track model mean nothing backwards: give a log of driving forwards"
+)
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
 _ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
 _HOLDS = 0.2  # of what it demands: a law that holds this closely needs no regression
@@ -177,6 +182,9 @@ def _check_laws(drive: Drive, model_car: bool) -> tuple[list[Contradiction], lis
         check_over_ground(drive)
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
+        steer, yaw_rate = drive.mean(channels["steer_rad"]), drive.mean(channels["yaw_rate_radps"])
+        if turns_as_steered(speed, steer, yaw_rate):
+            raise Implausible("vx_mps", _REVERSES)
         raise wrong_sign("vx_mps", "is negative for most of the drive", speed, drive)
     check_sizes(drive)
     _check_lateral(drive)

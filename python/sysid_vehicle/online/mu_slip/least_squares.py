@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.text import HALF_95
 from ..._common.typed import typed
 from ...errors import InvalidInput
 from ...rules import USUAL
@@ -16,6 +18,7 @@ from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
 from .data import MuSlipData, at_least_one, check_noise, check_values
 from .results import MuSlipEstimate, cautions, resting
 
+_ROUNDS = 100  # of a fit with one parameter held
 _FEWEST = 20  # readings that the normal distribution of the ratio takes
 
 
@@ -71,6 +74,13 @@ def mu_slip_fit(
     values = found["mean"]
     at_bound = resting(curve, values, low, high)
     notes += cautions(curve, data, values, at_bound)
+    open_ = _left_open(data, curve, found, variance, (low, high)) if found["converged"] else ()
+    open_ = tuple(name for name in open_ if name not in at_bound)
+    notes += [
+        f"{name}: the interval is too short, the readings allow values twice as far away; take "
+        f"readings nearer the peak"
+        for name in open_
+    ]
     if corrected:
         values = values - variance * found["bias"]
         outside = (values < low) | (values > high)
@@ -87,7 +97,39 @@ def mu_slip_fit(
         variance * found["covariance"],
         tuple(notes),
         at_bound,
+        open_,
     )
+
+
+def _left_open(
+    data: MuSlipData,
+    curve: MuSlipCurve,
+    found: Mapping[str, Any],
+    variance: float,
+    bounds: tuple[FloatArray, FloatArray],
+) -> tuple[str, ...]:
+    """Parameters that the readings leave open at twice the half-width of their interval.
+
+    There the sum of squares, least over the other parameters, would be larger by four times what
+    ends an interval of 95 %, were the curve straight; it is larger by less than that.
+    """
+    values, covariance = found["mean"], variance * found["covariance"]
+    result = []
+    for i, name in enumerate(curve.parameters):
+        std = math.sqrt(covariance[i, i])
+        for far in (values[i] - 2.0 * HALF_95 * std, values[i] + 2.0 * HALF_95 * std):
+            at = min(max(far, bounds[0][i]), bounds[1][i])
+            if name in result or abs(at - values[i]) <= HALF_95 * std:
+                continue
+            low, high = bounds[0].copy(), bounds[1].copy()
+            low[i], high[i] = at - 1e-9 * std, at + 1e-9 * std
+            start = values + covariance[:, i] / covariance[i, i] * (at - values[i])
+            there = curve.kernels.fit(
+                data.slip, data.mu, np.clip(start, low, high), low, high, _ROUNDS
+            )
+            if there["sum_of_squares"] - found["sum_of_squares"] < HALF_95**2 * variance:
+                result.append(name)
+    return tuple(result)
 
 
 @typed

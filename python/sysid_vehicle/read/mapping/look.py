@@ -124,13 +124,16 @@ def even(
 ) -> tuple[FloatArray, dict[str, FloatArray]] | None:
     """The channels on common even times, to look at: interpolated, for nothing else.
 
-    Times of gaps are left out, however long: what lies between is no driving.
+    Times of gaps are left out, however long: what lies between is no driving. Rows that repeat or
+    go back in time are left out too: reading the log will refuse them, with the remedy.
     """
     known = {}
     for channel, (clock, values) in held.items():
         there = np.isfinite(clock) & np.isfinite(values)
         there[standing(values, fewest=1)] = False  # a dropout, whatever its unit
-        if np.count_nonzero(there) >= _FEWEST and (np.diff(clock[there]) > 0.0).all():
+        before = np.maximum.accumulate(np.where(there, clock, -np.inf))
+        there[1:] &= clock[1:] > before[:-1]
+        if np.count_nonzero(there) >= _FEWEST:
             known[channel] = factor * clock[there], values[there]
     if not known:
         return None

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
 from ...log import times_wheelbase
-from ...log.laws.laws import LINEAR_MPS2, cosine, fit
+from ...log.laws.laws import LINEAR_MPS2, cosine, fit, turns_as_steered
 from ...log.laws.motion import Windows
 from ...vehicle import GRAVITY_MPS2
 from .look import with_gaps
@@ -92,9 +92,8 @@ def scales(
     factors = _likeliest(drive, stated, notes)
     _signs(drive, factors, notes)
     if "steer_rad" in columns:
-        unit = stated.get("steer_rad")
         factors["steer_rad"] = _steer(
-            drive, factors, unit, wheelbase_m, notes, of_full_lock=of_full_lock
+            drive, factors, stated.get("steer_rad"), wheelbase_m, notes, of_full_lock=of_full_lock
         )
     if drive.has("fx_n", "ax_mps2"):
         factors["fx_n"] = _force(drive, factors, stated.get("fx_n"), notes)
@@ -311,7 +310,9 @@ def _signs(drive: _Windows, factors: dict[str, float], notes: dict[str, str]) ->
         factors[name] = -factors[name]
         notes[name] = f"turned round: {why}"
 
-    if "vx_mps" in factors and float(np.median(drive.mean("vx_mps"))) < 0.0:
+    parts = "vx_mps", "steer_rad", "yaw_rate_radps"
+    at_odds = not (drive.has(*parts) and turns_as_steered(*map(drive.mean, parts)))
+    if at_odds and "vx_mps" in factors and float(np.median(drive.mean("vx_mps"))) < 0.0:
         turn_round("vx_mps", "it is negative for most of the drive")
     forward = math.copysign(1.0, factors.get("vx_mps", 1.0))
     if drive.has("vx_mps", "ax_mps2"):
@@ -323,9 +324,8 @@ def _signs(drive: _Windows, factors: dict[str, float], notes: dict[str, str]) ->
     turn = forward * drive.mean("vx_mps", "yaw_rate_radps")
     ay = drive.mean("ay_mps2")
     if _cosine(turn, ay) < -_FOLLOWS:
-        odd = "ay_mps2"
-        if drive.has("steer_rad") and _cosine(drive.mean("steer_rad"), turn) < 0.0:
-            odd = "yaw_rate_radps"
+        against = drive.has("steer_rad") and _cosine(drive.mean("steer_rad"), turn) < 0.0
+        odd = "yaw_rate_radps" if against else "ay_mps2"
         turn_round(
             odd,
             "it moves against the other two of yaw rate, a_y and steering; where these are "
