@@ -124,7 +124,7 @@ def _own_lag_s(model: Model, told: Contradiction, log: Log) -> float:
 
 
 def _shift_s(value: float, unit: str, speed_mps: float) -> float:
-    """Time that a delay, a distance at this speed or a compliance, which has any, stands for."""
+    """Time that a delay or a distance at this speed stands for; anything else has any."""
     if unit == "m":
         return abs(value) / speed_mps
     return abs(value) if unit == "s" else np.inf if value else 0.0

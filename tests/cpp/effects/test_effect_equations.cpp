@@ -147,12 +147,28 @@ TEST(EffectEquation, SteeringAngles) {
     EXPECT_NEAR(offset.on.w.delta, 0.066, 1e-15);
     const Pair ratio("steer_ratio", {0.08}, kCornering, kDriving);
     EXPECT_NEAR(ratio.on.w.delta, 0.06 * 1.08, 1e-15);
-    const Pair compliance("steer_compliance", {1.5e-6}, kCornering, kDriving);
-    EXPECT_NEAR(compliance.on.w.delta, 0.06 - 1.5e-6 * 1500.0 * 1.5 / 2.7 * 25.0 * 0.35, 1e-15);
     // What acts is the angle: the same as steering so.
     const auto steered = evaluate({saloon()}, kCornering, {0.066, 3000.0}, offset.p);
     for (std::size_t i = 0; i < kMotionStates; ++i)
         EXPECT_NEAR(offset.on.rate[i], steered.rate[i], 1e-12);
+}
+
+TEST(EffectEquation, ComplianceTwistsByTheForceAtTheTwistedAngle) {
+    const double load = 1500.0 * kGravity * 1.5 / 2.7;
+    for (const auto& [c, near] : {std::pair{1.5e-6, 1e-8}, {1.5e-5, 1e-4}, {-1.5e-6, 1e-8}}) {
+        for (const double steer : {-0.06, 0.01, 0.06, 0.15}) {
+            const Input u{steer, 3000.0};
+            const Pair it("steer_compliance", {c}, kCornering, u);
+            const TyreCoefficients<double> tyre{it.p[kBFront], it.p[kCFront], it.p[kDFront],
+                                                it.p[kEFront]};
+            const double force = load * magic_formula(it.on.w.alpha_f, tyre);
+            EXPECT_NEAR(it.on.w.delta, steer - c * force, near) << c << " " << steer;
+        }
+    }
+    // The rear axle steers nothing; what turns less is the front one.
+    const Pair it("steer_compliance", {1.5e-6}, kCornering, kDriving);
+    EXPECT_LT(it.on.w.alpha_f, it.off.w.alpha_f);
+    EXPECT_EQ(it.on.w.alpha_r, it.off.w.alpha_r);
 }
 
 TEST(EffectEquation, OffsetAndRatioComeBeforeTheLag) {

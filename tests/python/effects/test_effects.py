@@ -78,8 +78,7 @@ def test_twins_name_each_other_and_needs_are_channels() -> None:
 
 def test_effects_say_what_they_break_and_what_logs_share() -> None:
     broken = {e.id: e.breaks for e in catalogue() if e.breaks}
-    late = ("steer_delay", "steer_lag", "steer_compliance", "tyre_relaxation")
-    late = (*late, "front_tyre_relaxation")
+    late = ("steer_delay", "steer_lag", "tyre_relaxation", "front_tyre_relaxation")
     expected = dict.fromkeys(late, "answers late") | {"sensor_delay": "readings late"}
     expected |= dict.fromkeys(("speed_sensor_lever_arm", "imu_lever_arm"), "readings elsewhere")
     assert broken == expected | {"road_grade": "on a slope"}

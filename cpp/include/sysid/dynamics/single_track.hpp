@@ -223,6 +223,10 @@ struct SingleTrackOf {
         w.brake_front = S(car.brake_front_share);
         w.drive_front = S(car.drive_front_share);
         each([&](auto e, const T* own, std::size_t) { return e.vehicle(own, w); });
+        const auto rest =
+            static_loads(plain<T>(w.m) * car.gravity_mps2, plain<T>(w.l_f), plain<T>(w.l_r));
+        w.fz0_f = S(rest.front);
+        w.fz0_r = S(rest.rear);
     }
 
     template <class S, class T>
@@ -230,6 +234,8 @@ struct SingleTrackOf {
         w.rho = car.air_density_kgpm3;
         w.B_f = S(p[kBFront]);
         w.B_r = S(p[kBRear]);
+        w.C_f = S(p[kCFront]);
+        w.E_f = S(p[kEFront]);
         w.mu_peak_f = S(p[kDFront]);
         w.mu_peak_r = S(p[kDRear]);
         w.time_s = u.time_s;
@@ -265,9 +271,6 @@ struct SingleTrackOf {
         using std::cos;
         using std::sin;
         const auto m = plain<T>(w.m), l_f = plain<T>(w.l_f), l_r = plain<T>(w.l_r);
-        const auto rest = static_loads(m * car.gravity_mps2, l_f, l_r);
-        w.fz0_f = S(rest.front);
-        w.fz0_r = S(rest.rear);
         const S c = w.cos_delta = cos(w.delta);
         const S s = w.sin_delta = sin(w.delta);
         const auto lever = named("lever", plain<T>(w.h) / (l_f + l_r));

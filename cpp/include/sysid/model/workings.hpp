@@ -46,6 +46,7 @@ struct Workings {
     S fx_f, fx_r;            // longitudinal axle forces [N]
     S fz_f, fz_r;            // axle loads [N]
     S B_f, B_r;              // B of the Magic Formula [1/rad]
+    S C_f, E_f;              // its C and E, of the front axle
     S mu_peak_f, mu_peak_r;  // its D
     S grip_f, grip_r;        // factors on the lateral axle forces
     S fy_f, fy_r;            // lateral axle forces [N]
