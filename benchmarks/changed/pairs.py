@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,11 +28,16 @@ KINDS = (
 ASKED = (*KINDS, "steering delay", "yaw inertia")
 """With those that are not drawn, but made where they are asked for."""
 
-DRIVING = ("lap", "handling", "sweep", "ramp")
+ROADS = ("road", "hills")
+"""Every day's roads, a motorway, a country road or a town each; with slopes."""
+
+DRIVING = ("lap", "handling", "sweep", "ramp", "step", *ROADS)
 
 _RATE_HZ = 50.0
 _SECONDS = 40.0
 _SWEEP_S = 25.0
+_ROAD_S = 60.0
+_SLOPE_RAD = 0.015  # standard deviation of grade and of crossfall, on hills
 _EASIER = (1.0, 0.85, 0.7, 0.55, 0.4)
 _SHARES = {"limit": 0.88, "gentle": 0.45}  # of what the tyres give
 _LACKING = ("", "", "body_attitude", "tyre_relaxation", "lateral_load_transfer", "steer_compliance")
@@ -80,7 +85,13 @@ class Pair:
 
 
 def drawn(
-    seed: int, number: int, kind: str = "", driving: str = "", *, apart: bool = False
+    seed: int,
+    number: int,
+    kind: str = "",
+    driving: str = "",
+    *,
+    apart: bool = False,
+    with_vy: bool = True,
 ) -> Pair:
     """Pair `number` of a seed, of a kind and in driving that are drawn where none is given."""
     rng = np.random.default_rng([seed, number])
@@ -115,7 +126,10 @@ def drawn(
         _driven(model, courses[1], _SHARES[name] * _limit(model), road, noise, seeds[1])
         for model in (singles if apart and len(todo) > 1 else [])
     ]
-    told = f"{name} {'-'.join(courses)}"
+    told = driving if driving in ROADS else f"{name} {'-'.join(courses)}"
+    if not with_vy:
+        logs, alone = ([log.without("vy_mps") for log in some] for some in (logs, alone))
+        told += " no vy"
     return Pair(kind, told, lacks, road, truths, baseline, *logs, alone)
 
 
@@ -234,11 +248,15 @@ def _driven(
     pushes = sv.RoadDisturbance()
     if road:
         pushes = sv.RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
+    if course == "hills":
+        pushes = replace(pushes, slope_rad=_SLOPE_RAD)
     made = {
+        **dict.fromkeys(ROADS, lambda a: _usual_road(seed)),
         "lap": lambda a: sv.manoeuvres.lap(_SECONDS, lateral_mps2=a),
         "handling": lambda a: sv.manoeuvres.handling_course(_SECONDS, lateral_mps2=a),
         "sweep": lambda a: sv.manoeuvres.sine_sweep(_SWEEP_S, lateral_mps2=a),
         "ramp": lambda a: sv.manoeuvres.ramp_steer(lateral_mps2=a, rise_s=4.0),
+        "step": lambda a: sv.manoeuvres.step_steer((17.0, 27.0), (0.5 * a, a)),
     }[course]
     for ease in _EASIER:
         try:
@@ -254,3 +272,10 @@ def _driven(
             if ease == _EASIER[-1]:
                 raise
     raise AssertionError("unreachable")
+
+
+def _usual_road(seed: int) -> sv.manoeuvres.Manoeuvre:
+    """A road of some kind; each drive has another one."""
+    rng = np.random.default_rng(seed)
+    kinds: tuple[sv.manoeuvres.RoadKind, ...] = ("motorway", "country", "town")
+    return sv.manoeuvres.usual_road(kinds[rng.integers(len(kinds))], _ROAD_S, rng)

@@ -28,6 +28,19 @@ def test_what_changed_is_what_is_told(program: SimpleNamespace, kind: str) -> No
     assert not np.array_equal(pair.before["vy_mps"], pair.after["vy_mps"])
 
 
+@pytest.mark.parametrize("driving", ["step", "road", "hills"])
+def test_the_driving_is_the_one_that_is_asked_for(program: SimpleNamespace, driving: str) -> None:
+    pair = program.pairs.drawn(3, 5, "friction", driving, with_vy=False)
+    assert driving in pair.driving
+    assert "vy_mps" not in pair.before.channels
+    assert pair.before.duration_s > 20.0
+    if driving in program.pairs.ROADS:
+        assert pair.before.duration_s == pytest.approx(60.0, abs=0.1)
+        assert not np.array_equal(pair.before["steer_rad"], pair.after["steer_rad"])
+        other = program.pairs.drawn(3, 5, "friction", "hills" if driving == "road" else "road")
+        assert not np.array_equal(pair.before["ax_mps2"], other.before["ax_mps2"])
+
+
 def row(truths: int, named: bool, wrong: int) -> dict[str, object]:
     told = {"first": named, "group": named, "least": named, "inside": named}
     return {

@@ -56,6 +56,16 @@ def test_what_is_lacked_explains_more_than_what_seems_to_have_changed(
     assert lagging.lack() is None
 
 
+def test_a_change_is_as_large_as_it_differs_from_the_reference(lagging: Saying) -> None:
+    """What the reference has of it, and its model lacks, is no part of the change's size."""
+    name = f"{LACK}.relaxation_length_m"
+    state, nothing = visited(lagging, LACK), visited(lagging)
+    assert state.searched.value(name) > 0.3
+    assert abs(state.changes[name]) < 0.1
+    price = state.reached - nothing.reached - lagging.search.over_nothing(state, lagging.told, 1.0)
+    assert price == pytest.approx(lagging.told.price((LACK,), {name: 0.0}), abs=0.05)
+
+
 def test_what_changed_is_no_lack(offset: Saying) -> None:
     assert offset.state.put == (OFFSET,)
     assert offset.lack() is None
@@ -76,7 +86,7 @@ def test_what_is_added_counts_where_it_gains_beyond_a_lack(
         both = replace(
             alone,
             put=(OFFSET, RATIO),
-            sizes=alone.sizes | {"steer_ratio.ratio_error": 0.0},
+            changes=alone.changes | {"steer_ratio.ratio_error": 0.0},
             reached=alone.reached + reached,
             among=alone.among + 500.0,
         )

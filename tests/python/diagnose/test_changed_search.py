@@ -176,7 +176,7 @@ def test_an_added_change_is_none_where_it_does_as_well_as_a_lack() -> None:
         search.rules, search.start = USUAL, None  # type: ignore[assignment]
         search.visited = {
             frozenset(p): SimpleNamespace(  # type: ignore[misc]
-                put=p, sizes={}, log_likelihood=value, among=value, reached=reached
+                put=p, changes={}, log_likelihood=value, among=value, reached=reached
             )
             for p, (value, reached) in figures.items()
         }

@@ -45,8 +45,6 @@ class Exact:
     shift : array, shape (n,)
         By which its parameters differ from those of the reference as it was; as much as lines say
         that what multiplies tyres makes of them.
-    sizes : dict of str to float
-        The same of the parameters of what changed.
     changes : dict of str to float
         By which parameters of what changed differ from the reference fitted in the same way.
     log_likelihood : float
@@ -66,7 +64,6 @@ class Exact:
     fit: Fit
     searched: Model
     shift: FloatArray
-    sizes: dict[str, float]
     changes: dict[str, float]
     log_likelihood: float
     reached: float
@@ -260,15 +257,14 @@ class Reference:
         shift = np.zeros(len(self.side.names))
         for n in without(model).free_names:
             shift[self.place[n]] = model.value(n) - self.value(n)
-        sizes = {n: model.value(n) - self.value(n) for n in names}
+        changes = {n: change(n, own.value(n), model.value(n)) for n in names}
         for e in (e for e in SCALINGS if e.id in put):
             for n, moved in moves(e.id, model).items():
-                shift[self.place[n]] += moved * sum(sizes[own] for own in e.named)
-        changes = {n: change(n, own.value(n), model.value(n)) for n in names}
+                shift[self.place[n]] += moved * sum(changes[factor] for factor in e.named)
         fit = replace(start, model=as_tyres(model))
         lost = lost_to_input_noise(fit, fit.driving)
         told = (value + lost, reached + lost, among + lost)
-        return Exact(tuple(put), fit, model, shift, sizes, changes, *told, climbed)
+        return Exact(tuple(put), fit, model, shift, changes, *told, climbed)
 
     def _climbed(
         self, start: Fit, model: Model, own: Model, loose: Sequence[str], changed: Sequence[str]

@@ -282,7 +282,7 @@ class Search:
                     )
                     for a, b, alone in ((rival, effect, state), (effect, rival, other))
                 )
-                prices = (told.price(s.put, s.sizes) for s in (state, other))
+                prices = (told.price(s.put, s.changes) for s in (state, other))
                 odds[rival] = 0.5 * (w - v) / ratio + next(prices) - next(prices)
         return odds
 
@@ -358,7 +358,7 @@ class Search:
         Among what is likelier than nothing, and adds changes to each part of it, that by which
         these compare: what is added and only gains as a lack of the reference does is no change.
         """
-        price = told.price(state.put, state.sizes)
+        price = told.price(state.put, state.changes)
         more = self.over_nothing(state, told, ratio) > 0.0 and not self._lacking_in_both(
             state, ratio
         )
@@ -378,7 +378,7 @@ class Search:
     def over_nothing(self, state: Exact, told: Competition, ratio: float) -> float:
         """By how much a state is likelier than that nothing changed [nats]."""
         nothing = self.visited[frozenset()].reached
-        return (state.reached - nothing) / ratio - told.price(state.put, state.sizes)
+        return (state.reached - nothing) / ratio - told.price(state.put, state.changes)
 
     def nothing(self, told: Competition) -> float:
         """Probability that nothing changed, beside all that was fitted.
