@@ -31,6 +31,7 @@ class Saying:
     def __init__(self, search: Search) -> None:
         self.search = search
         self.told, self.state = search.found()
+        self._places: dict[str, tuple[Exact, Competition]] = {}
 
     @cached_property
     def at_one_point(self) -> Competition:
@@ -64,13 +65,13 @@ class Saying:
 
     def _not_refused(self, told: Competition, state: Exact) -> list[CredibleSet]:
         """Sets by scores whose likeliest is not what was put in, and no refit has refused it."""
-        put = state.put
+        put, tried = state.put, self.search.visited.keys() | self.search.failed
         return [
             s
             for s in told.causes.sets
             if not any(e in put for e in s.effects)
             and not told.acts_like(s.effects[0])
-            and frozenset({*put, s.effects[0]}) not in self.search.visited
+            and frozenset({*put, s.effects[0]}) not in tried
         ]
 
     def _told_sizes(
@@ -88,11 +89,12 @@ class Saying:
         for e in self.search.can:
             self._by_ratio(e, sizes, stds)
         for s in shown:
-            for e in s.effects:
+            for e in (e for e in s.effects if e not in {*state.put, *self._places}):
                 other = self._in_place(e, s, state) or self._in_place(e, s, named)
-                if other is not None and e not in state.put:
+                if other is not None:
+                    self._places[e] = other, self.search.told(other)
                     sizes |= self._sizes_in(other, e)
-                    own = self._of_the_car(self.search.told(other).stds_beside, other)
+                    own = self._of_the_car(self._places[e][1].stds_beside, other)
                     stds |= {n: max(own[n], stds[n]) for n in self.search.can[e].names}
         return sizes, stds
 
@@ -191,7 +193,7 @@ class Saying:
         least = np.log(self.search.rules.credible)
         if whole - scipy.special.logsumexp([whole, *absent]) < least:
             return None
-        return found
+        return found.led_by(effect)  # sizes of what leads are told together
 
     def _some_off_nothing(
         self, effect: str, of: CredibleSet, state: Exact, told: Competition
@@ -320,17 +322,19 @@ class Saying:
         if m not in self.search.tyres:
             return None
         put = m.id in self.state.put
-        told = self.told if put else self.at_one_point
-        model = self.search.before.model if put else self.state.searched
+        fitted = (self.state, self.told) if put else self._places.get(m.id)
+        model = self.search.before.model if fitted else self.state.searched
         before = np.array([model.value(n) for n in m.names[:3]])  # B, C, D
-        after = before + np.array(sizes[:3]) if put else before
+        after = before + np.array(sizes[:3]) if fitted else before
         ratio = float(np.prod(after) / np.prod(before))
         later = as_float64([*(ratio / after), 0.0])
         earlier = as_float64([*(-ratio / before), 0.0])
-        if put:
-            known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
+        if fitted:
+            state, told = fitted
+            known = {**dict(zip(m.names, sizes, strict=True)), **state.changes}
             value = ratio - 1.0
         else:
+            told = self.at_one_point
             known = told.beside(m.id)
             value = (1.0 - cut) * float(later @ [known[n] for n in m.names])
         std = told.std_along(m.id, (later, earlier), known)
