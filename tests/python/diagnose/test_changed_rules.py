@@ -100,6 +100,18 @@ def test_what_is_added_counts_where_it_gains_beyond_a_lack(
     assert beside(-1.0, shared=500.0) > 450.0
 
 
+def test_what_is_known_badly_may_be_off_nothing(
+    offset: Saying, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a drag in a wind that both drives may have: lines from nothing tell that it is there."""
+    ((name, usual),) = offset.search.can[OFFSET].usual.items()
+    assert offset._off_nothing(OFFSET, offset.state, offset.told)
+    monkeypatch.setitem(offset.told.stds, name, usual)
+    assert offset._off_nothing(OFFSET, offset.state, offset.told)
+    monkeypatch.setitem(offset.search.singles.stds, name, usual)
+    assert not offset._off_nothing(OFFSET, offset.state, offset.told)
+
+
 def test_a_size_is_as_far_from_nothing_as_its_likelihood_says(offset: Saying) -> None:
     """No line makes it surer, and the size is the one that was fitted."""
     name = "steer_offset.offset_rad"

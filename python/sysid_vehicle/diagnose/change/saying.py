@@ -150,18 +150,26 @@ class Saying:
 
         What stands in for a lack of the model gains likelihood as a change does. Of tyres the
         interval of their force has to exclude nothing, at some slip that was driven: likelihoods
-        of four coefficients that no driving tells apart gain by what the model lacks.
+        of four coefficients that no driving tells apart gain by what the model lacks. A size may be
+        known badly though it is not nothing, as a drag is in a wind: so lines from where it is
+        nothing are asked as well.
         """
         m, rules = self.search.can[effect], self.search.rules
-        sizes = [state.changes[n] for n in m.names]
         if m in self.search.tyres:
             forces = self.search.forces(effect, state, told)
             return any(abs(share) > rules.interval * std for share, std in forces)
-        stds = [told.stds[n] for n in m.names]
-        return any(
-            abs(size) > told.least(s, usual) - rules.bound * s
-            for size, s, usual in zip(sizes, stds, m.scale, strict=True)
-        )
+
+        def off(told: Competition, sizes: Mapping[str, float]) -> bool:
+            known = ((sizes[n], told.stds[n], usual) for n, usual in m.usual.items())
+            return any(abs(x) > told.least(s, usual) - rules.bound * s for x, s, usual in known)
+
+        if off(told, state.changes):
+            return True
+        rest = self.search.visited.get(frozenset(state.put) - {effect})
+        if rest is None:
+            return False
+        beside = self.search.told(rest) if rest.put else self.search.singles
+        return off(beside, beside.sizes)
 
     def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:
         """The state with an effect in place of another one of its set, where it was visited."""
