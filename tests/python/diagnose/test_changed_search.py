@@ -264,3 +264,18 @@ def test_a_set_is_led_by_what_was_fitted() -> None:
     assert led.effects == ("tyre_front", "tyre_rear", "mass")
     assert led.probabilities == tuple(found.weights[e] for e in led.effects)
     assert found.led_by("yaw_inertia") is found
+
+
+def test_rivals_are_fitted_wherever_a_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What goes for want of lines leaves changes whose other names nobody has asked for."""
+    begun, left = ("steer_lag", "mass"), ("steer_lag",)
+    search = searching(
+        monkeypatch, {"steer_lag": 1e-9, "mass": 0.3}, {(): -9.0, begun: -2.0, left: -1.0}
+    )
+    tried: list[tuple[str, ...]] = []
+    monkeypatch.setattr(search, "_better", lambda state, _: state)
+    monkeypatch.setattr(search, "_visit_in_place", lambda state, _: tried.append(state.put))
+    lines = {"steer_lag": 1e-9, "mass": 0.3}
+    _, state = search._settled(Told(begun, lines), search.visited[frozenset(begun)])  # type: ignore[arg-type]
+    assert state.put == left
+    assert tried == [begun, left]
