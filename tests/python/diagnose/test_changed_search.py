@@ -253,9 +253,14 @@ def test_what_cannot_be_fitted_is_not_named_by_its_line(monkeypatch: pytest.Monk
     said = Saying.__new__(Saying)
     said.search = search
     sets = [CredibleSet.of({e: 0.0}, 0.95) for e in ("friction", "mass")]
-    told = SimpleNamespace(causes=SimpleNamespace(sets=sets), acts_like=lambda _: "")
+    told = SimpleNamespace(
+        causes=SimpleNamespace(sets=sets), acts_like=lambda _: "", beside_put={"mass": 9.0}
+    )
     state = search.visited[frozenset()]
     assert [s.effects for s in said._not_refused(told, state)] == [("mass",)]  # type: ignore[arg-type]
+    # What has no refit has to be likely beside what was put in.
+    told.beside_put["mass"] = 1.0
+    assert said._not_refused(told, state) == []  # type: ignore[arg-type]
 
 
 def test_a_set_is_led_by_what_was_fitted() -> None:

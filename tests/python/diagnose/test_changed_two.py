@@ -78,3 +78,11 @@ def test_what_is_beside_its_rival_is_as_large_as_in_its_place(before: Fit, truth
     fitted = np.prod([model.value(n) for n in names]) / np.prod([reference.value(n) for n in names])
     assert share == pytest.approx(fitted - 1.0, abs=0.02)
     assert abs(share) > 3.0 * std
+
+
+def test_a_change_that_no_effect_explains_is_told_where_it_acts(before: Fit, truth: Model) -> None:
+    """A drag that may not have changed, beside a steering that was set otherwise: along the car."""
+    values = {"aero_drag.drag_area_m2": 0.6, "steer_offset.offset_rad": 0.006}
+    change = told(before, truth, values, ("steer_offset",))
+    assert "steer_offset" in {e.id for e in change.named}
+    assert [s.effects for s in change.unknown] == [("unknown dv_x/dt",)]

@@ -64,14 +64,20 @@ class Saying:
         )
 
     def _not_refused(self, told: Competition, state: Exact) -> list[CredibleSet]:
-        """Sets by scores whose likeliest is not what was put in, and no refit has refused it."""
+        """Sets by scores whose likeliest is not what was put in, and no refit has refused it.
+
+        An unknown has no refit: it has to be likely beside what was put in. Where scores vary more
+        than white ones, several that vary less may take the place of that.
+        """
         put, tried = state.put, self.search.visited.keys() | self.search.failed
+        least = scipy.special.logit(self.search.rules.credible)
         return [
             s
             for s in told.causes.sets
             if not any(e in put for e in s.effects)
             and not told.acts_like(s.effects[0])
             and frozenset({*put, s.effects[0]}) not in tried
+            and told.beside_put.get(s.effects[0], np.inf) > least
         ]
 
     def _told_sizes(
