@@ -108,6 +108,8 @@ def test_what_is_known_badly_may_be_off_nothing(
     assert offset._off_nothing(OFFSET, offset.state, offset.told)
     monkeypatch.setitem(offset.told.stds, name, usual)
     assert offset._off_nothing(OFFSET, offset.state, offset.told)
+    both = replace(offset.state, put=(OFFSET, RATIO))  # which may stand in for each other
+    assert not offset._off_nothing(OFFSET, both, offset.told)
     monkeypatch.setitem(offset.search.singles.stds, name, usual)
     assert not offset._off_nothing(OFFSET, offset.state, offset.told)
 

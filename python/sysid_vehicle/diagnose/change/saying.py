@@ -157,8 +157,8 @@ class Saying:
         What stands in for a lack of the model gains likelihood as a change does. Of tyres the
         interval of their force has to exclude nothing, at some slip that was driven: likelihoods
         of four coefficients that no driving tells apart gain by what the model lacks. A size may be
-        known badly though it is not nothing, as a drag is in a wind: so lines from where it is
-        nothing are asked as well.
+        known badly though it is not nothing, as a drag is in a wind: of a change alone lines from
+        nothing are asked as well. Beside others that stand in for it they tell too much.
         """
         m, rules = self.search.can[effect], self.search.rules
         if m in self.search.tyres:
@@ -169,13 +169,8 @@ class Saying:
             known = ((sizes[n], told.stds[n], usual) for n, usual in m.usual.items())
             return any(abs(x) > told.least(s, usual) - rules.bound * s for x, s, usual in known)
 
-        if off(told, state.changes):
-            return True
-        rest = self.search.visited.get(frozenset(state.put) - {effect})
-        if rest is None:
-            return False
-        beside = self.search.told(rest) if rest.put else self.search.singles
-        return off(beside, beside.sizes)
+        singles = self.search.singles
+        return off(told, state.changes) or (state.put == (effect,) and off(singles, singles.sizes))
 
     def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:
         """The state with an effect in place of another one of its set, where it was visited."""
