@@ -1,7 +1,7 @@
 """Does a comparison of two drives name what changed in the car between them, and nothing else?
 
     python benchmarks/changed [--seed 1] [--pairs 40] [--unchanged 20] [--kind KIND] [--json FILE]
-                              [--driving COURSE] [--apart]
+                              [--driving COURSE] [--apart] [--without-vy]
     python benchmarks/changed --read FILE [FILE ...]
 
 Each pair is a car of its own: mass, wheelbase, place of the centre of gravity, tyres, what its
@@ -122,6 +122,7 @@ def main() -> None:
     parser.add_argument(
         "--apart", action="store_true", help="of two changes only pairs where each alone is named"
     )
+    parser.add_argument("--without-vy", action="store_true", help="nobody measures v_y")
     parser.add_argument("--json", type=Path, metavar="FILE", help="a line for each pair")
     parser.add_argument("--read", nargs="+", type=Path, metavar="FILE")
     args = parser.parse_args()
@@ -135,7 +136,14 @@ def main() -> None:
         if number < args.first:
             continue
         try:
-            pair = drawn(args.seed, number, kind, args.driving, apart=args.apart)
+            pair = drawn(
+                args.seed,
+                number,
+                kind,
+                args.driving,
+                apart=args.apart,
+                with_vy=not args.without_vy,
+            )
             row = judged(pair)
         except sv.SysidError as e:
             print(f"{number:3d} {kind}: {e}", flush=True)

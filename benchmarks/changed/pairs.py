@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,16 +28,23 @@ KINDS = (
 ASKED = (*KINDS, "steering delay", "yaw inertia")
 """With those that are not drawn, but made where they are asked for."""
 
-DRIVING = ("lap", "handling", "sweep", "ramp")
+ROADS = ("road", "hills")
+"""Every day's roads, a motorway, a country road and a town in each set; with slopes."""
+
+DRIVING = ("lap", "handling", "sweep", "ramp", "step", *ROADS)
 
 _RATE_HZ = 50.0
 _SECONDS = 40.0
 _SWEEP_S = 25.0
+_ROAD_S = 40.0  # of each road
+_KINDS_OF_ROADS: tuple[sv.manoeuvres.RoadKind, ...] = ("motorway", "country", "town")
+_SLOPE_RAD = 0.015  # standard deviation of grade and of crossfall, on hills
 _EASIER = (1.0, 0.85, 0.7, 0.55, 0.4)
 _SHARES = {"limit": 0.88, "gentle": 0.45}  # of what the tyres give
 _LACKING = ("", "", "body_attitude", "tyre_relaxation", "lateral_load_transfer", "steer_compliance")
 
 Names = dict[str, float]
+Drives = tuple[sv.Log, ...]
 
 
 @dataclass(frozen=True)
@@ -60,12 +67,12 @@ class Truth:
 
 @dataclass
 class Pair:
-    """Two drives of a car, and what is between them.
+    """Two sets of drives of a car, and what is between them.
 
     Attributes
     ----------
-    alone : list of Log
-        The second drive after each of two changes without the other one, where they are asked for.
+    alone : list of drives
+        The second set after each of two changes without the other one, where they are asked for.
     """
 
     kind: str
@@ -74,13 +81,19 @@ class Pair:
     road: bool
     truths: list[Truth]
     baseline: sv.Model
-    before: sv.Log
-    after: sv.Log
-    alone: list[sv.Log] = field(default_factory=list)
+    before: Drives
+    after: Drives
+    alone: list[Drives] = field(default_factory=list)
 
 
 def drawn(
-    seed: int, number: int, kind: str = "", driving: str = "", *, apart: bool = False
+    seed: int,
+    number: int,
+    kind: str = "",
+    driving: str = "",
+    *,
+    apart: bool = False,
+    with_vy: bool = True,
 ) -> Pair:
     """Pair `number` of a seed, of a kind and in driving that are drawn where none is given."""
     rng = np.random.default_rng([seed, number])
@@ -107,16 +120,20 @@ def drawn(
         courses = [driving, driving]
     noise = sv.SensorNoise().scaled(float(rng.choice((0.7, 1.0, 1.5))))
     seeds = [int(s) for s in rng.integers(2**31, size=2)]
-    logs = [
-        _driven(model, course, _SHARES[name] * _limit(model), road, noise, s)
-        for model, course, s in zip((car, changed), courses, seeds, strict=True)
-    ]
-    alone = [
-        _driven(model, courses[1], _SHARES[name] * _limit(model), road, noise, seeds[1])
-        for model in (singles if apart and len(todo) > 1 else [])
-    ]
-    told = f"{name} {'-'.join(courses)}"
-    return Pair(kind, told, lacks, road, truths, baseline, *logs, alone)
+
+    def driven(model: sv.Model, course: str, seed: int) -> Drives:
+        several = [(course, seed)]
+        if course in ROADS:
+            several = [(f"{course} {of}", seed + i) for i, of in enumerate(_KINDS_OF_ROADS)]
+        mps2 = _SHARES[name] * _limit(model)
+        logs = (_driven(model, one, mps2, road, noise, s) for one, s in several)
+        return tuple(log if with_vy else log.without("vy_mps") for log in logs)
+
+    sets = [driven(m, c, s) for m, c, s in zip((car, changed), courses, seeds, strict=True)]
+    alone = [driven(m, courses[1], seeds[1]) for m in (singles if apart else []) if len(todo) > 1]
+    told = driving if driving in ROADS else f"{name} {'-'.join(courses)}"
+    told += "" if with_vy else " no vy"
+    return Pair(kind, told, lacks, road, truths, baseline, *sets, alone)
 
 
 def _car(rng: np.random.Generator, kind: str) -> tuple[sv.Model, sv.Model, str]:
@@ -234,12 +251,17 @@ def _driven(
     pushes = sv.RoadDisturbance()
     if road:
         pushes = sv.RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
+    of, _, kind = course.partition(" ")
+    if of == "hills":
+        pushes = replace(pushes, slope_rad=_SLOPE_RAD)
     made = {
+        **dict.fromkeys(ROADS, lambda _: sv.manoeuvres.usual_road(kind, _ROAD_S, seed)),
         "lap": lambda a: sv.manoeuvres.lap(_SECONDS, lateral_mps2=a),
         "handling": lambda a: sv.manoeuvres.handling_course(_SECONDS, lateral_mps2=a),
         "sweep": lambda a: sv.manoeuvres.sine_sweep(_SWEEP_S, lateral_mps2=a),
         "ramp": lambda a: sv.manoeuvres.ramp_steer(lateral_mps2=a, rise_s=4.0),
-    }[course]
+        "step": lambda a: sv.manoeuvres.step_steer((17.0, 27.0), (0.5 * a, a)),
+    }[of]
     for ease in _EASIER:
         try:
             return sv.drive(

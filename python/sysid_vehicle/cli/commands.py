@@ -49,7 +49,6 @@ def _demo(args: argparse.Namespace, heard: Warnings) -> None:
 
 
 def _compare(args: argparse.Namespace, heard: Warnings) -> None:
-    _define(args)
     model = Model(Vehicle.from_toml(args.vehicle), args.effects)
     logs = read_logs(args.logs, args, model.vehicle)
     fit = identify(model, logs)
@@ -63,7 +62,6 @@ def _compare(args: argparse.Namespace, heard: Warnings) -> None:
 
 
 def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
-    _define(args)
     study = _study(args, heard)
     print(replace(study.test[0], event=None))  # those of the final model follow
     print()
@@ -84,7 +82,6 @@ def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
 
 
 def _improve(args: argparse.Namespace, heard: Warnings) -> None:
-    _define(args)
     study = _study(args, heard)
     # The warnings have gone to the error stream.
     print(study.with_warnings(()))
@@ -109,7 +106,6 @@ def _print_where(study: Study) -> None:
 
 
 def _effects(args: argparse.Namespace, heard: Warnings) -> None:
-    _define(args)
     sized = effect if args.vehicle is None else Model(Vehicle.from_toml(args.vehicle)).effect
     print("\n\n".join(str(sized(e)) for e in args.names or catalogue()))
     if args.names:
@@ -125,7 +121,7 @@ def _map(args: argparse.Namespace, heard: Warnings) -> None:
     print(written_map(args.log, args.output, args.dbc, vehicle), end="")
 
 
-COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
+_COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "demo": _demo,
     "compare": _compare,
     "diagnose": _diagnose,
@@ -144,12 +140,13 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
 }
 
 
-def _define(args: argparse.Namespace) -> None:
-    """Run the user's files that define effects."""
-    for path in args.define:
+def run(args: argparse.Namespace, heard: Warnings) -> None:
+    """Run a command, after the user's files that define effects."""
+    for path in getattr(args, "define", ()):
         if path.exists():  # for what a package brings, `load_effects` says it
             say_it_runs(path)
         load_effects(path)
+    _COMMANDS[args.command](args, heard)
 
 
 def _study(args: argparse.Namespace, heard: Warnings) -> Study:
@@ -157,6 +154,7 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
     model = Model(Vehicle.from_toml(args.vehicle))
     if args.nuisances:
         model = model.with_nuisances()
+    model = model.add(*args.effects)
     train = read_logs(args.logs, args, model.vehicle)
     test = read_logs(args.test, args, model.vehicle) if args.test else None
     study = improve(

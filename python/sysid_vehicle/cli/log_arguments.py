@@ -62,6 +62,21 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
         metavar="A,B",
         help="effects that the model has from the start",
     )
+    add_define(parser)
+
+
+def add_define(parser: argparse.ArgumentParser) -> None:
+    """Ask for effects of the user's own."""
+    parser.add_argument(
+        "--define",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="PY",
+        help="Python file that defines effects of your own, or the id of an effect that an "
+        "installed package defines; it is run as a program with all your rights: give only what "
+        "you trust (may be repeated)",
+    )
 
 
 def read_logs(

@@ -13,7 +13,7 @@ from .._common.progress import note
 from .._common.starting import INTERRUPTED, ending, interruptible
 from .._common.text import columns, wrapped
 from ..errors import Interrupted, SysidError
-from .commands import COMMANDS
+from .commands import run
 from .outputs import refuse_outputs
 from .parser import parse
 
@@ -38,7 +38,7 @@ def main(argv: list[str] | None = None) -> int:
             args = parse(argv)
             with _warnings_as_lines() as heard, _read_to_the_end_or_not(args.command):
                 refuse_outputs(args)
-                COMMANDS[args.command](args, heard)
+                run(args, heard)
                 sys.stdout.flush()
     except (SysidError, OSError) as error:
         print(f"sysid-vehicle: error: {_one_line(str(error))}", file=sys.stderr)

@@ -8,7 +8,7 @@ from pathlib import Path
 from .. import _core
 from ..demo import DEFAULT, RANDOM
 from . import changed, fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
-from .log_arguments import LOG_HELP, add_driving, add_effects, add_level, names
+from .log_arguments import LOG_HELP, add_define, add_driving, add_effects, add_level, names
 from .outputs import add_json, add_output
 
 _MARKDOWN = (".md",)  # in which a study may be reported too
@@ -47,18 +47,18 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     add_json(demo)
 
     compare = commands.add_parser("compare", help="fit the model to logs, see where it fails")
-    _driving(compare)
+    add_driving(compare)
     add_effects(compare)
     add_json(compare)
 
     diagnose = commands.add_parser("diagnose", help="learn which physical effect is missing")
-    _driving(diagnose)
+    add_driving(diagnose)
     _validation(diagnose)
     _search(diagnose)
     add_json(diagnose)
 
     improve = commands.add_parser("improve", help="add what is missing, and show what it does")
-    _driving(improve)
+    add_driving(improve)
     _validation(improve)
     _search(improve)
     add_output(improve, "--report", kind="HTML", also=_MARKDOWN, help="report to write")
@@ -84,28 +84,10 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     effects.add_argument(
         "--vehicle", metavar="TOML", help="vehicle file: sizes in this car (default: ordinary ones)"
     )
-    _define(effects)
+    add_define(effects)
     lab.add_parser(commands)
     twin.add_parser(commands)
     return parser.parse_args(argv)
-
-
-def _driving(parser: argparse.ArgumentParser) -> None:
-    add_driving(parser)
-    _define(parser)
-
-
-def _define(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--define",
-        action="append",
-        default=[],
-        type=Path,
-        metavar="PY",
-        help="Python file that defines effects of your own, or the id of an effect that an "
-        "installed package defines; it is run as a program with all your rights: give only what "
-        "you trust (may be repeated)",
-    )
 
 
 def _validation(parser: argparse.ArgumentParser) -> None:
@@ -120,6 +102,7 @@ def _validation(parser: argparse.ArgumentParser) -> None:
 
 
 def _search(parser: argparse.ArgumentParser) -> None:
+    add_effects(parser)
     parser.add_argument(
         "--nuisances",
         action="store_true",

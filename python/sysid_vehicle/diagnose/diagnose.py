@@ -82,6 +82,10 @@ def diagnose(
     time_limit_s : float, optional
         After so many seconds refits end: what was not refitted by then is ranked by its score,
         and not named.
+    seed : int
+        Of the draws that p-values over all effects together come from.
+    progress : bool, optional
+        Show progress; by default in a terminal or a notebook.
     """
     ends = time.perf_counter() + duration(time_limit_s, "time_limit_s")
     rules = rules.at(alpha)

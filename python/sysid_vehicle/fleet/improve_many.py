@@ -73,6 +73,8 @@ def improve_many(
         the session has defined go to the other processes with the studies.
     retry : bool
         Whether to try again what failed in an earlier run.
+    progress : bool, optional
+        Show progress; by default in a terminal or a notebook.
     tell : callable, optional
         Called with a sentence about each study that ends.
     **options

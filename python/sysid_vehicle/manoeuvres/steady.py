@@ -63,6 +63,8 @@ def steady_steer(
 
     Parameters
     ----------
+    vehicle : Vehicle
+        The car, with its tyres.
     speed_mps, lateral_mps2 : array_like, shape (n,) or ()
         Speed and lateral acceleration.
 

@@ -103,6 +103,10 @@ def improve(
         smaller, as the likelihood fits it or as predictions do, is adequate where no name stands,
         whatever is left. By default the noise of the sensors counts, at most the usual sizes, in
         the mean square, and slow forces count whatever their size.
+    starts : int
+        Starts of the search for the baseline, as in `identify`.
+    seed : int
+        Of these starts, and of what p-values are drawn by.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool, optional

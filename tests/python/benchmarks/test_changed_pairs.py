@@ -10,13 +10,13 @@ BENCHMARK = ("changed", "pairs", "counts")
 
 def test_a_pair_is_drawn_again(program: SimpleNamespace) -> None:
     one, again = (program.pairs.drawn(3, 5, "friction") for _ in range(2))
-    np.testing.assert_array_equal(one.after["ay_mps2"], again.after["ay_mps2"])
+    np.testing.assert_array_equal(one.after[0]["ay_mps2"], again.after[0]["ay_mps2"])
     (truth,) = one.truths
     assert truth.effects == ("friction_both_axles",)
     assert -0.4 <= truth.size <= -0.15
     other = program.pairs.drawn(3, 6, "friction")
     assert other.baseline.vehicle.mass_kg != one.baseline.vehicle.mass_kg
-    assert other.before.n == one.before.n
+    assert other.before[0].n == one.before[0].n
 
 
 @pytest.mark.parametrize("kind", ["nothing", "two", "downforce", "relaxation"])
@@ -25,7 +25,20 @@ def test_what_changed_is_what_is_told(program: SimpleNamespace, kind: str) -> No
     assert pair.kind == kind
     least = {"nothing": 0, "two": 2}.get(kind, 1)
     assert least <= len(pair.truths) <= (4 if kind == "two" else least)
-    assert not np.array_equal(pair.before["vy_mps"], pair.after["vy_mps"])
+    assert not np.array_equal(pair.before[0]["vy_mps"], pair.after[0]["vy_mps"])
+
+
+@pytest.mark.parametrize("driving", ["step", "road", "hills"])
+def test_the_driving_is_the_one_that_is_asked_for(program: SimpleNamespace, driving: str) -> None:
+    pair = program.pairs.drawn(3, 5, "friction", driving, with_vy=False)
+    assert driving in pair.driving
+    assert "vy_mps" not in pair.before[0].channels
+    assert pair.before[0].duration_s > 20.0
+    assert len(pair.before) == len(pair.after) == (1 if driving == "step" else 3)
+    if driving in program.pairs.ROADS:
+        assert not np.array_equal(pair.before[0]["steer_rad"], pair.after[0]["steer_rad"])
+        other = program.pairs.drawn(3, 5, "friction", "hills" if driving == "road" else "road")
+        assert not np.array_equal(pair.before[0]["ax_mps2"], other.before[0]["ax_mps2"])
 
 
 def row(truths: int, named: bool, wrong: int) -> dict[str, object]:

@@ -1,6 +1,7 @@
 """The exam keeps its books: what is hidden, what was found, and how often."""
 
 import json
+import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -211,3 +212,25 @@ def test_a_trial_tells_what_was_found(exam: SimpleNamespace) -> None:
     assert true == pytest.approx(0.5)
     assert abs(value - true) < 4.0 * std
     assert found["test_errors"][-1] < found["test_errors"][0]
+
+
+def test_the_totals_are_those_of_the_rows() -> None:
+    """Figures of a row that is added stand in the last line, and in what quotes it."""
+    text = (Path(__file__).resolve().parents[3] / "benchmarks/exam/README.md").read_text("utf-8")
+    table = text.split("## The present rules")[1].split("\n\n")[2].splitlines()
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in table[2:]]
+    *parts, whole = rows
+
+    def shares(row: list[str], column: int) -> list[tuple[int, int]]:
+        return [(int(a), int(b)) for a, b in re.findall(r"(\d+) of (\d+)", row[column])]
+
+    def total(column: int, place: int) -> tuple[int, int]:
+        told = (shares(row, column) for row in parts)
+        few = [several[place] for several in told if len(several) > max(place, 0)]
+        return sum(a for a, _ in few), sum(b for _, b in few)
+
+    assert whole[0] == "together"
+    for column in (2, 3, 6):
+        assert shares(whole, column)[0] == total(column, 0)
+    assert shares(whole, 4) == [total(4, 0), total(4, -1)]  # told apart, or all are
+    assert shares(whole, 5) == [total(5, place) for place in range(3)]

@@ -69,6 +69,42 @@ def error_of(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
     return err[0]
 
 
+@pytest.mark.parametrize(
+    ("command", "asked", "more"),
+    [
+        ("compare", "commands.identify", ()),
+        ("diagnose", "commands.improve", ()),
+        ("improve", "commands.improve", ("--nuisances",)),
+        ("changed", "changed.identify", ("--after", "LOG")),
+        ("next-drive", "next_drive.identify", ("--between", "mass,steer_lag")),
+    ],
+)
+def test_each_study_of_a_log_begins_with_effects_of_the_users_own(
+    command: str,
+    asked: str,
+    more: tuple[str, ...],
+    effect_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    car = sv.Model(sv.example_vehicle())
+    car.vehicle.to_toml(tmp_path / "car.toml")
+    log = str(tmp_path / "lap.csv")
+    sv.drive(car, sv.manoeuvres.lap(10.0), seed=1, rate_hz=50.0).to_csv(log)
+    models: list[sv.Model] = []
+
+    def kept(model: sv.Model, *_: object, **__: object) -> None:
+        models.append(model)
+        raise sv.SysidError("asked")
+
+    monkeypatch.setattr(f"sysid_vehicle.cli.{asked}", kept)
+    argv = [command, log, "--vehicle", str(tmp_path / "car.toml"), "--define", str(effect_file)]
+    argv += ["--effects", "of_a_file,steer_lag", *(log if m == "LOG" else m for m in more)]
+    assert main(argv) == 2
+    (model,) = models
+    assert model.effects[-2:] == ("of_a_file", "steer_lag")
+
+
 def test_effects_of_a_file_are_run_with_a_word(
     effect_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

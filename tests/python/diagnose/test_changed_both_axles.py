@@ -1,5 +1,7 @@
 """Changes of the tyres of both axles: a wet road is told as that."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,8 @@ from sysid_vehicle.diagnose.change.both_axles import (
     moves,
     without,
 )
+from sysid_vehicle.diagnose.change.together import together
+from sysid_vehicle.errors import NumericalError
 from sysid_vehicle.estimate import Driving
 
 AXLES = ("front", "rear")
@@ -114,3 +118,37 @@ def test_derivatives_are_those_of_the_multiplied_tyres(both: Model, fit: Fit, co
         step[c] = 1e-5
         slope = (problem.residuals(p - step, gains) - problem.residuals(p + step, gains)) / 2e-5
         assert np.abs(G[:, j] - slope.ravel()).max() < 1e-3 * np.abs(slope).max()
+
+
+def test_no_car_has_tyres_beyond_any(both: Model, fit: Fit, course: Log) -> None:
+    """Of friction that no driving tells both factors may be large: no likelihood is told then."""
+    problem, noise = Scaled.of(Driving.of(course), both), fit.noise.vector()
+    known, p = both.parameters, both.vector()
+    beyond = p.copy()
+    beyond[known["D_front"].column] = 4.0
+    beyond[known[f"{FRICTION}.relative_error"].column] = 1.0
+    with pytest.raises(NumericalError, match="beyond those of any car"):
+        problem.freeze(beyond, noise)
+    alone, lost = problem.log_likelihoods(np.array([p, beyond]), noise)
+    assert lost == -np.inf
+    assert alone == pytest.approx(problem.log_likelihoods(p[None], noise)[0])
+    assert problem.log_likelihoods(beyond[None], noise)[0] == -np.inf
+
+
+def test_what_stays_is_no_nearer_to_the_reference_than_both_drives_say(
+    fit: Fit, course: Log
+) -> None:
+    """Its estimates are no prior: coefficients that no driving tells may be any in the same car."""
+    later = replace(fit, driving=Driving.of(course))
+    objective = together(fit, later, fit.model, fit.model, ())
+    p, noise = fit.model.vector(), fit.noise.vector()
+    p[fit.model.parameters["C_front"].column] += 0.5
+    drivings = (later.driving, fit.driving)
+    of_both = sum(d.problem(fit.model).log_likelihoods(p[None], noise)[0] for d in drivings)
+    assert objective.log_likelihood(p, noise) == pytest.approx(of_both)
+    # What the user knew of it counts, as in the fit itself.
+    known = replace(fit, model=fit.model.with_priors({"C_front": (1.4, 0.1)}))
+    told = together(known, later, fit.model, fit.model, ()).log_likelihood(p, noise)
+    assert told < objective.log_likelihood(p, noise) - 5.0
+    free = together(known, later, fit.model, fit.model, ("C_front",))
+    assert free.prior == ()

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from changed_drives import OFFSET, inside, later
 from contradictions import contradictions_of_changes
@@ -51,6 +52,12 @@ def test_what_would_be_named_is_named(truth: Model, before: Fit, offset: Change)
     assert [e.id for e in change.named] == ["steer_ratio"]
     matters = before.model.with_nuisances().parameters["steer_offset.offset_rad"].matters
     assert matters < offset["steer_offset"].least[0] < 2.0 * matters
+
+
+def test_what_is_beyond_doubt_is_99_percent_sure(offset: Change) -> None:
+    """Not all that may have changed is known to the catalogue."""
+    for probability, told in ((1.0, "99 % sure"), (0.5059, "50 % sure")):
+        assert replace(offset.effects[0], probability=probability).sure == told
 
 
 def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
@@ -153,3 +160,31 @@ def test_a_change_prints_and_is_kept(offset: Change, tmp_path: Path) -> None:
     assert again.log_likelihood == offset.before.log_likelihood
     with pytest.raises(KeyError, match="there are steer_offset"):
         offset["no_effect"]
+
+
+def test_a_load_is_told_where_mass_and_centre_of_gravity_changed(none: Change) -> None:
+    """150 kg at 1.2 m behind the centre of gravity of a car that weighs more than its file says."""
+    model = none.before.model.add("mass").with_values({"mass.relative_error": 0.1})
+    before = model.vehicle.mass_kg * 1.1
+    after = before + 150.0
+    sizes = {"mass": (150.0 / before, 0.001), "cg_position": (150.0 * 1.2 / after, 0.002)}
+    named = [
+        replace(none[e], value=(size,), std=(std,), said="changed")
+        for e, (size, std) in sizes.items()
+    ]
+    others = (e for e in none.effects if e.id not in sizes)
+    change = replace(none, before=replace(none.before, model=model), effects=(*named, *others))
+    assert change.load is not None
+    assert change.load.mass_kg == pytest.approx(150.0)
+    assert change.load.mass_std_kg == pytest.approx(0.001 * before)
+    assert change.load.rearward_m == pytest.approx(1.2)
+    more, back = sizes["mass"][0], sizes["cg_position"][0]
+    # place = back (1 + more) / more, by its derivatives
+    spread = np.hypot(0.002 * (1.0 + more) / more, 0.001 * back / more**2)
+    assert change.load.rearward_std_m == pytest.approx(spread)
+    assert "as a load of 150 +-" in str(change)
+    assert "m behind the centre of gravity, would change them" in str(change)
+    less = replace(change, effects=(replace(named[0], value=(-0.1,)), *change.effects[1:]))
+    assert "as taking out" in str(less)
+    assert "ahead of" in str(less)
+    assert replace(change, effects=change.effects[1:]).load is None

@@ -56,6 +56,16 @@ def test_what_is_lacked_explains_more_than_what_seems_to_have_changed(
     assert lagging.lack() is None
 
 
+def test_a_change_is_as_large_as_it_differs_from_the_reference(lagging: Saying) -> None:
+    """What the reference has of it, and its model lacks, is no part of the change's size."""
+    name = f"{LACK}.relaxation_length_m"
+    state, nothing = visited(lagging, LACK), visited(lagging)
+    assert state.searched.value(name) > 0.3
+    assert abs(state.changes[name]) < 0.1
+    price = state.reached - nothing.reached - lagging.search.over_nothing(state, lagging.told, 1.0)
+    assert price == pytest.approx(lagging.told.price((LACK,), {name: 0.0}), abs=0.05)
+
+
 def test_what_changed_is_no_lack(offset: Saying) -> None:
     assert offset.state.put == (OFFSET,)
     assert offset.lack() is None
@@ -76,7 +86,7 @@ def test_what_is_added_counts_where_it_gains_beyond_a_lack(
         both = replace(
             alone,
             put=(OFFSET, RATIO),
-            sizes=alone.sizes | {"steer_ratio.ratio_error": 0.0},
+            changes=alone.changes | {"steer_ratio.ratio_error": 0.0},
             reached=alone.reached + reached,
             among=alone.among + 500.0,
         )
@@ -88,6 +98,20 @@ def test_what_is_added_counts_where_it_gains_beyond_a_lack(
     assert beside(1.0, shared=0.0) > 450.0
     # All changes in both drives the same are a compromise: this one alone is none.
     assert beside(-1.0, shared=500.0) > 450.0
+
+
+def test_what_is_known_badly_may_be_off_nothing(
+    offset: Saying, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a drag in a wind that both drives may have: lines from nothing tell that it is there."""
+    ((name, usual),) = offset.search.can[OFFSET].usual.items()
+    assert offset._off_nothing(OFFSET, offset.state, offset.told)
+    monkeypatch.setitem(offset.told.stds, name, usual)
+    assert offset._off_nothing(OFFSET, offset.state, offset.told)
+    both = replace(offset.state, put=(OFFSET, RATIO))  # which may stand in for each other
+    assert not offset._off_nothing(OFFSET, both, offset.told)
+    monkeypatch.setitem(offset.search.singles.stds, name, usual)
+    assert not offset._off_nothing(OFFSET, offset.state, offset.told)
 
 
 def test_a_size_is_as_far_from_nothing_as_its_likelihood_says(offset: Saying) -> None:

@@ -4,9 +4,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from sysid_vehicle.diagnose.candidates.causes import CredibleSet
 from sysid_vehicle.diagnose.change.both_axles import FRICTION, STIFFNESS, by_other_names, hold_tyres
+from sysid_vehicle.diagnose.change.rivals import in_place
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
+from sysid_vehicle.errors import NumericalError
 from sysid_vehicle.rules import USUAL
 
 
@@ -31,8 +34,8 @@ def searching(
 ) -> Search:
     """A search that has visited all of the evidence, and climbed where there are several."""
     search = Search.__new__(Search)
-    search.rules, search.tyres = USUAL, ()
-    search.can = {e: SimpleNamespace() for e in lines}  # type: ignore[misc]
+    search.rules, search.tyres, search.failed = USUAL, (), set()
+    search.can = {e: SimpleNamespace(usual={}) for e in lines}  # type: ignore[misc]
     search.visited = {
         frozenset(p): SimpleNamespace(put=p, changes={}, among=0.0, climbed=len(p) > 1)  # type: ignore[misc]
         for p in evidence
@@ -44,6 +47,7 @@ def searching(
     )
     monkeypatch.setattr(search, "told", lambda state: Told(state.put, lines))
     monkeypatch.setattr(search, "_leading", lambda _, state: state.put)
+    monkeypatch.setattr(search, "_visit_in_place", lambda *_: None)
     monkeypatch.setattr(search, "evidence", lambda state, *_: evidence[state.put])
     return search
 
@@ -176,7 +180,7 @@ def test_an_added_change_is_none_where_it_does_as_well_as_a_lack() -> None:
         search.rules, search.start = USUAL, None  # type: ignore[assignment]
         search.visited = {
             frozenset(p): SimpleNamespace(  # type: ignore[misc]
-                put=p, sizes={}, log_likelihood=value, among=value, reached=reached
+                put=p, changes={}, log_likelihood=value, among=value, reached=reached
             )
             for p, (value, reached) in figures.items()
         }
@@ -220,3 +224,63 @@ def test_a_change_by_other_names_does_not_speak_against_it(
     # Against all else it speaks as ever.
     state = search.visited[frozenset({front, both})]
     assert [s.put for s in search.lacking("mass", state, ())] == [(front, both)]
+
+
+def test_what_lines_lead_to_beside_its_stand_in_is_tried_in_its_place() -> None:
+    """A downforce does at one speed what tyres do; beside it lines tell of those that changed."""
+    sets = [SimpleNamespace(effects=(e,)) for e in ("tyre_front", "mass", "steer_ratio")]
+    told = SimpleNamespace(
+        put=("aero_downforce", "steer_ratio"),
+        causes=SimpleNamespace(sets=sets, of=lambda _: None),
+        acts_like=lambda e: {"tyre_front": "aero_downforce"}.get(e, ""),
+    )
+    few = ("aero_downforce", "tyre_front", "mass", "steer_ratio")
+    can = dict.fromkeys(few, SimpleNamespace(rivals=()))
+    assert in_place("aero_downforce", told, can) == ["tyre_front"]  # type: ignore[arg-type]
+    assert in_place("steer_ratio", told, can) == []  # type: ignore[arg-type]
+
+
+def test_what_cannot_be_fitted_is_not_named_by_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No car does what its line tells: a friction whose tyres would be beyond any."""
+    search = searching(monkeypatch, {"friction": 1e-9, "mass": 1e-9}, {(): 0.0})
+
+    def fitted(*_: object) -> None:
+        raise NumericalError("beyond")
+
+    search.reference.fitted = fitted  # type: ignore[method-assign, assignment]
+    search._visit(("friction",), Told((), {}))  # type: ignore[arg-type]
+    assert search.failed == {frozenset({"friction"})}
+    said = Saying.__new__(Saying)
+    said.search = search
+    sets = [CredibleSet.of({e: 0.0}, 0.95) for e in ("friction", "mass")]
+    told = SimpleNamespace(
+        causes=SimpleNamespace(sets=sets), acts_like=lambda _: "", beside_put={"mass": 9.0}
+    )
+    state = search.visited[frozenset()]
+    assert [s.effects for s in said._not_refused(told, state)] == [("mass",)]  # type: ignore[arg-type]
+    # What has no refit has to be likely beside what was put in.
+    told.beside_put["mass"] = 1.0
+    assert said._not_refused(told, state) == []  # type: ignore[arg-type]
+
+
+def test_a_set_is_led_by_what_was_fitted() -> None:
+    found = CredibleSet.of({"tyre_rear": 0.4, "tyre_front": 0.0, "mass": -0.5}, 0.95)
+    led = found.led_by("tyre_front")
+    assert led.effects == ("tyre_front", "tyre_rear", "mass")
+    assert led.probabilities == tuple(found.weights[e] for e in led.effects)
+    assert found.led_by("yaw_inertia") is found
+
+
+def test_rivals_are_fitted_wherever_a_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What goes for want of lines leaves changes whose other names nobody has asked for."""
+    begun, left = ("steer_lag", "mass"), ("steer_lag",)
+    search = searching(
+        monkeypatch, {"steer_lag": 1e-9, "mass": 0.3}, {(): -9.0, begun: -2.0, left: -1.0}
+    )
+    tried: list[tuple[str, ...]] = []
+    monkeypatch.setattr(search, "_better", lambda state, _: state)
+    monkeypatch.setattr(search, "_visit_in_place", lambda state, _: tried.append(state.put))
+    lines = {"steer_lag": 1e-9, "mass": 0.3}
+    _, state = search._settled(Told(begun, lines), search.visited[frozenset(begun)])  # type: ignore[arg-type]
+    assert state.put == left
+    assert tried == [begun, left]

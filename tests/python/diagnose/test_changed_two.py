@@ -1,9 +1,15 @@
 """Two changes at once: what imitates both is likelier than either, and is not what changed."""
 
+import numpy as np
 import pytest
 
 from sysid_vehicle import Change, Fit, Model, changed, drive, manoeuvres
 from sysid_vehicle.diagnose.change.both_axles import FRICTION, STIFFNESS
+from sysid_vehicle.diagnose.change.saying import Saying
+from sysid_vehicle.diagnose.change.search import Search
+from sysid_vehicle.diagnose.changed import _later
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.rules import USUAL
 
 
 def told(
@@ -50,3 +56,33 @@ def test_tyres_of_each_axle_are_both_and_one_of_them(before: Fit, truth: Model) 
     axles = [e for e in ("tyre_front", "tyre_rear", STIFFNESS) if f"{e}:" in str(change)]
     assert len(axles) == 2
     assert "confounded with" in str(change).split("\n", maxsplit=1)[0]
+    # Each is as large as it is beside the others of the headline.
+    sizes = {e: (change[e].stiffness or change[e].value)[0] for e in axles}
+    for axle, factor in (("front", 0.85), ("rear", 0.76)):
+        own = 1.0 + sizes.get(f"tyre_{axle}", 0.0)
+        assert own * (1.0 + sizes.get(STIFFNESS, 0.0)) == pytest.approx(factor, abs=0.02)
+
+
+def test_what_is_beside_its_rival_is_as_large_as_in_its_place(before: Fit, truth: Model) -> None:
+    """Beside the other tyres that are put in it would be nothing."""
+    car = truth.with_values(softer(truth, "B", 0.85, 0.76))
+    later = drive(car, manoeuvres.handling_course(15.0, lateral_mps2=7.5), seed=42, rate_hz=50.0)
+    said = Saying(Search(before, _later(before, Driving.of(later), None), ("mass",), USUAL))
+    change = said.change()
+    (axle,) = {e.id for e in change.named if e.id.startswith("tyre_")} - {*said.state.put}
+    share, std = change[axle].stiffness or (0.0, np.inf)
+    state, _ = said._places[axle]
+    assert axle in state.put
+    model, reference = state.searched, before.model
+    names = [f"{letter}_{axle.removeprefix('tyre_')}" for letter in "BCD"]
+    fitted = np.prod([model.value(n) for n in names]) / np.prod([reference.value(n) for n in names])
+    assert share == pytest.approx(fitted - 1.0, abs=0.02)
+    assert abs(share) > 3.0 * std
+
+
+def test_a_change_that_no_effect_explains_is_told_where_it_acts(before: Fit, truth: Model) -> None:
+    """A drag that may not have changed, beside a steering that was set otherwise: along the car."""
+    values = {"aero_drag.drag_area_m2": 0.6, "steer_offset.offset_rad": 0.006}
+    change = told(before, truth, values, ("steer_offset",))
+    assert "steer_offset" in {e.id for e in change.named}
+    assert [s.effects for s in change.unknown] == [("unknown dv_x/dt",)]

@@ -53,6 +53,13 @@ class CredibleSet:
         told = dict(zip(names, map(float, weights), strict=True))
         return cls(tuple(names[:few]), tuple(told.values())[:few], told)
 
+    def led_by(self, effect: str) -> CredibleSet:
+        """The same with one of its effects in front, whether or not it is the likeliest."""
+        if effect not in self.effects:
+            return self
+        order = (effect, *(e for e in self.effects if e != effect))
+        return replace(self, effects=order, probabilities=tuple(self.weights[e] for e in order))
+
     def __str__(self) -> str:
         pairs = zip(self.effects, self.probabilities, strict=True)
         return " or ".join(f"{e} ({100 * p:.0f} %)" for e, p in pairs)

@@ -17,9 +17,10 @@ import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect, Parameter
-from ...errors import InvalidInput
+from ...errors import InvalidInput, NumericalError
 from ...estimate import Driving
 from ...model import Model
+from ...tyre import TYRE_RANGES
 from ...vehicle import AXLES
 from .both_drivings import OneDriving
 from .may_change import May
@@ -162,10 +163,13 @@ class Scaled:
         Of the model without them.
     tyres : dict of int to dict
         By column of a coefficient, by column of an effect: the power of its factor.
+    most : dict of int to float
+        By column of a coefficient, the largest one of any tyre: no likelihood has a larger one.
     """
 
     problem: OneDriving
     tyres: dict[int, dict[int, int]]
+    most: dict[int, float]
 
     @classmethod
     def of(cls, driving: Driving, model: Model) -> OneDriving:
@@ -180,7 +184,8 @@ class Scaled:
             for letter, power in _POWERS[e.id].items():
                 for axle in AXLES:
                     tyres.setdefault(known[f"{letter}_{axle}"].column, {})[column] = power
-        return cls(problem, tyres)
+        most = {known[f"{x}_{a}"].column: TYRE_RANGES[x].high for x in "BD" for a in AXLES}
+        return cls(problem, tyres, most)
 
     @property
     def samples(self) -> int:
@@ -218,7 +223,14 @@ class Scaled:
 
     def log_likelihoods(self, sets: FloatArray, noise: FloatArray) -> FloatArray:
         """Of sets of parameters, a row each; minus infinity where one fails."""
-        return self.problem.log_likelihoods(np.array([self._car(p) for p in sets]), noise)
+        found = np.full(len(sets), -np.inf)
+        cars: dict[int, FloatArray] = {}
+        for i, p in enumerate(sets):
+            with suppress(NumericalError):
+                cars[i] = self._car(p)
+        if cars:
+            found[list(cars)] = self.problem.log_likelihoods(np.array([*cars.values()]), noise)
+        return found
 
     def _car(self, p: FloatArray) -> FloatArray:
         """Parameters of the compiled model, its tyres multiplied."""
@@ -226,6 +238,8 @@ class Scaled:
         for column, powers in self.tyres.items():
             for own, power in powers.items():
                 car[column] *= (1.0 + p[own]) ** power
+            if car[column] > self.most[column]:
+                raise NumericalError("the tyres are multiplied beyond those of any car")
         return car
 
     def _turn(self, p: FloatArray, columns: list[int]) -> tuple[list[int], FloatArray]:

@@ -30,8 +30,9 @@ class Change(Printed):
         Its model with the changes that were found, on the later driving, under the noise of the
         reference; nothing else was fitted to the later driving alone.
     causes : Causes
-        Posterior of a sum of single changes: inclusion probabilities, credible sets. What begins
-        with `unknown` is a change that no effect of the catalogue explains.
+        Posterior of a sum of single changes: inclusion probabilities, credible sets. Of each set
+        what was fitted together with those of the others stands first. What begins with `unknown`
+        is a change that no effect of the catalogue explains.
     effects : tuple of EffectChange
         What is named first, then by probability.
     nothing : float
@@ -65,7 +66,7 @@ class Change(Printed):
 
     @property
     def named(self) -> tuple[EffectChange, ...]:
-        """What may be called changed, the likeliest first; rivals follow each other."""
+        """What may be called changed, each followed by its rivals."""
         return tuple(e for e in self.effects if e.named)
 
     @property

@@ -326,7 +326,7 @@ class Competition:
         )
         named = (h for h in self._hypotheses if not h.name.startswith(UNKNOWN))
         known = replace(model, hypotheses=tuple(named))
-        self.beside_put = known.beside(self.put) if self.put else {}
+        self.beside_put = model.beside(self.put) if self.put else {}
         alone = tuple(e for s in known.subsets(1) for e in s.effects)
         parameters = {m.id: m.parameters for m in self._may}
         return causes_in(model, known, scale, parameters, self._rules, most=_MOST), alone

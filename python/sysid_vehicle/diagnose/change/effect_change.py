@@ -43,7 +43,8 @@ class EffectChange:
     names, units : tuple of str
         Of its parameters.
     value, std : tuple of float
-        Differences of its parameters and their standard errors, beside what else changed.
+        Differences of its parameters and their standard errors, beside what else changed; of one of
+        a group that another one leads, in the place of that one.
     bound : tuple of float
         How far from nothing each difference may be, at 95 %.
     least : tuple of float

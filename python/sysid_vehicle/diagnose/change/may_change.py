@@ -53,6 +53,11 @@ class May:
         """Prior standard deviations."""
         return tuple(p.typical for p in self.parameters)
 
+    @property
+    def usual(self) -> dict[str, float]:
+        """The same by name."""
+        return dict(zip(self.names, self.scale, strict=True))
+
 
 def as_one(put: Iterable[str]) -> list[tuple[str, ...]]:
     """What was put in, one by one; with a payload as one change."""

@@ -22,7 +22,7 @@ from .beside_reference import Shared, Side
 from .both_axles import SCALINGS, as_tyres, moves, without
 from .maximum import along, highest, highest_of
 from .may_change import May, change
-from .together import Together, cost, starts_of
+from .together import cost, starts_of, together
 
 _DELAY = "delay_s"  # how names of delays end
 _FOLLOWED = 2  # of the likeliest starts
@@ -45,8 +45,6 @@ class Exact:
     shift : array, shape (n,)
         By which its parameters differ from those of the reference as it was; as much as lines say
         that what multiplies tyres makes of them.
-    sizes : dict of str to float
-        The same of the parameters of what changed.
     changes : dict of str to float
         By which parameters of what changed differ from the reference fitted in the same way.
     log_likelihood : float
@@ -66,7 +64,6 @@ class Exact:
     fit: Fit
     searched: Model
     shift: FloatArray
-    sizes: dict[str, float]
     changes: dict[str, float]
     log_likelihood: float
     reached: float
@@ -130,7 +127,6 @@ class Reference:
         self.shared = Shared(as_float64(precision), centre)
         self._of = {n: m.id for m in may for n in m.names}
         self._of |= {n: e.id for e in SCALINGS for n in e.named}
-        self._both = Together(before, self.place, self.shared)
         self._fitted: dict[frozenset[str], tuple[Model, float]] = {}
         self._sharing: dict[tuple[frozenset[str], frozenset[str], bool], float] = {}
         self._nothing, self._unchanged = -np.inf, model
@@ -190,7 +186,7 @@ class Reference:
         own = self._fitted[key][0]
         if not put:
             model, value = self._fit(start, put, sizes, usual, own)
-            model, value = self._climbed(start, model, own, [], [])
+            model, value = self._climbed(start, model, own, [])
             return self._without(start, model, value)
         model, value = self._fit(start, put, sizes, usual, own, also)
         return self._exact(start, put, sizes, model, value, climbed=False)
@@ -209,7 +205,7 @@ class Reference:
         if state.climbed:
             return state
         own, names = self._fitted[frozenset(state.put)][0], list(state.changes)
-        model, value = self._climbed(start, state.searched, own, names, names)
+        model, value = self._climbed(start, state.searched, own, names)
         return self._exact(start, state.put, names, model, value, climbed=True)
 
     def sharing(self, start: Fit, state: Exact, few: Collection[str]) -> float:
@@ -222,8 +218,7 @@ class Reference:
             own, later = self._fitted[key[0]][0], state.searched
             alike = {n for n in state.changes if self._of[n] in few}
             changed = [n for n in state.changes if n not in alike]
-            loose = [*changed, *alike.difference(self.before.model.free_names)]
-            objective = self._both.objective(start, later, own, loose, changed)
+            objective = together(self.before, start, later, own, changed)
             ends = [{n: m.value(n) for n in alike} for m in (own, later)]
             ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in alike})
             best, reached = self._followed(objective, later, ends, climb=state.climbed)
@@ -260,21 +255,20 @@ class Reference:
         shift = np.zeros(len(self.side.names))
         for n in without(model).free_names:
             shift[self.place[n]] = model.value(n) - self.value(n)
-        sizes = {n: model.value(n) - self.value(n) for n in names}
+        changes = {n: change(n, own.value(n), model.value(n)) for n in names}
         for e in (e for e in SCALINGS if e.id in put):
             for n, moved in moves(e.id, model).items():
-                shift[self.place[n]] += moved * sum(sizes[own] for own in e.named)
-        changes = {n: change(n, own.value(n), model.value(n)) for n in names}
+                shift[self.place[n]] += moved * sum(changes[factor] for factor in e.named)
         fit = replace(start, model=as_tyres(model))
         lost = lost_to_input_noise(fit, fit.driving)
         told = (value + lost, reached + lost, among + lost)
-        return Exact(tuple(put), fit, model, shift, sizes, changes, *told, climbed)
+        return Exact(tuple(put), fit, model, shift, changes, *told, climbed)
 
     def _climbed(
-        self, start: Fit, model: Model, own: Model, loose: Sequence[str], changed: Sequence[str]
+        self, start: Fit, model: Model, own: Model, changed: Sequence[str]
     ) -> tuple[Model, float]:
         """From where a search stands still to the maximum of the likelihood itself."""
-        objective = self._both.objective(start, model, own, loose, changed)
+        objective = together(self.before, start, model, own, changed)
         noise, box = self.before.noise.vector(), free_box(model)
         p, _, reached = to_the_maximum(objective, model.vector(), noise, box)
         values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
@@ -291,7 +285,7 @@ class Reference:
         """
         own, apart = without(own), as_tyres(apart)
         changed = [n for n in apart.free_names if n not in self.before.model.free_names]
-        objective = self._both.objective(start, apart, own, changed, [])
+        objective = together(self.before, start, apart, own, [])
         ends = [{n: m.value(n) for n in apart.free_names} for m in (own, apart)]
         ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in apart.free_names})
         ends.append(ends[0] | {n: self._unchanged.value(n) for n in self._unchanged.free_names})
@@ -365,7 +359,7 @@ class Reference:
         if own is not None:  # changes begin where the reference ends
             model = model.with_values({n: own.value(n) for n in model.free_names})
         noise, box = self.before.noise.vector(), free_box(model)
-        objective = self._both.objective(start, model, own, list(sizes), list(sizes))
+        objective = together(self.before, start, model, own, sizes)
         p, best = box.inside(model.vector()), -np.inf
         unchanged = self._unchanged if own is not None else None
         starts = starts_of(model, objective, noise, sizes, usual, also, unchanged)

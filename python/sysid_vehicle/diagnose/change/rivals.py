@@ -32,9 +32,16 @@ def in_place(effect: str, told: Competition, can: Mapping[str, May]) -> list[str
         *can[effect].rivals,
         *(e for e, m in can.items() if effect in m.rivals),
         *(() if own is None else own.effects),
+        *_stood_in_for(effect, told),
         *by_other_names(effect, told.put),
     )
     return [e for e in dict.fromkeys(several) if e in can and e not in told.put]
+
+
+def _stood_in_for(effect: str, told: Competition) -> list[str]:
+    """What lines lead to beside an effect that acts like it: the change may be this one alone."""
+    leading = (s.effects[0] for s in told.causes.sets)
+    return [e for e in leading if e not in told.put and told.acts_like(e) == effect]
 
 
 def instead(put: tuple[str, ...], effect: str, rival: str) -> tuple[str, ...]:

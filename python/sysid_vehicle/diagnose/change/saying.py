@@ -31,6 +31,7 @@ class Saying:
     def __init__(self, search: Search) -> None:
         self.search = search
         self.told, self.state = search.found()
+        self._places: dict[str, tuple[Exact, Competition]] = {}
 
     @cached_property
     def at_one_point(self) -> Competition:
@@ -63,14 +64,20 @@ class Saying:
         )
 
     def _not_refused(self, told: Competition, state: Exact) -> list[CredibleSet]:
-        """Sets by scores whose likeliest is not what was put in, and no refit has refused it."""
-        put = state.put
+        """Sets by scores whose likeliest is not what was put in, and no refit has refused it.
+
+        An unknown has no refit: it has to be likely beside what was put in. Where scores vary more
+        than white ones, several that vary less may take the place of that.
+        """
+        put, tried = state.put, self.search.visited.keys() | self.search.failed
+        least = scipy.special.logit(self.search.rules.credible)
         return [
             s
             for s in told.causes.sets
             if not any(e in put for e in s.effects)
             and not told.acts_like(s.effects[0])
-            and frozenset({*put, s.effects[0]}) not in self.search.visited
+            and frozenset({*put, s.effects[0]}) not in tried
+            and told.beside_put.get(s.effects[0], np.inf) > least
         ]
 
     def _told_sizes(
@@ -88,11 +95,12 @@ class Saying:
         for e in self.search.can:
             self._by_ratio(e, sizes, stds)
         for s in shown:
-            for e in s.effects:
+            for e in (e for e in s.effects if e not in {*state.put, *self._places}):
                 other = self._in_place(e, s, state) or self._in_place(e, s, named)
-                if other is not None and e not in state.put:
+                if other is not None:
+                    self._places[e] = other, self.search.told(other)
                     sizes |= self._sizes_in(other, e)
-                    own = self._of_the_car(self.search.told(other).stds_beside, other)
+                    own = self._of_the_car(self._places[e][1].stds_beside, other)
                     stds |= {n: max(own[n], stds[n]) for n in self.search.can[e].names}
         return sizes, stds
 
@@ -148,18 +156,21 @@ class Saying:
 
         What stands in for a lack of the model gains likelihood as a change does. Of tyres the
         interval of their force has to exclude nothing, at some slip that was driven: likelihoods
-        of four coefficients that no driving tells apart gain by what the model lacks.
+        of four coefficients that no driving tells apart gain by what the model lacks. A size may be
+        known badly though it is not nothing, as a drag is in a wind: of a change alone lines from
+        nothing are asked as well. Beside others that stand in for it they tell too much.
         """
         m, rules = self.search.can[effect], self.search.rules
-        sizes = [state.changes[n] for n in m.names]
         if m in self.search.tyres:
             forces = self.search.forces(effect, state, told)
             return any(abs(share) > rules.interval * std for share, std in forces)
-        stds = [told.stds[n] for n in m.names]
-        return any(
-            abs(size) > told.least(s, usual) - rules.bound * s
-            for size, s, usual in zip(sizes, stds, m.scale, strict=True)
-        )
+
+        def off(told: Competition, sizes: Mapping[str, float]) -> bool:
+            known = ((sizes[n], told.stds[n], usual) for n, usual in m.usual.items())
+            return any(abs(x) > told.least(s, usual) - rules.bound * s for x, s, usual in known)
+
+        singles = self.search.singles
+        return off(told, state.changes) or (state.put == (effect,) and off(singles, singles.sizes))
 
     def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:
         """The state with an effect in place of another one of its set, where it was visited."""
@@ -191,7 +202,7 @@ class Saying:
         least = np.log(self.search.rules.credible)
         if whole - scipy.special.logsumexp([whole, *absent]) < least:
             return None
-        return found
+        return found.led_by(effect)  # sizes of what leads are told together
 
     def _some_off_nothing(
         self, effect: str, of: CredibleSet, state: Exact, told: Competition
@@ -320,17 +331,19 @@ class Saying:
         if m not in self.search.tyres:
             return None
         put = m.id in self.state.put
-        told = self.told if put else self.at_one_point
-        model = self.search.before.model if put else self.state.searched
+        fitted = (self.state, self.told) if put else self._places.get(m.id)
+        model = self.search.before.model if fitted else self.state.searched
         before = np.array([model.value(n) for n in m.names[:3]])  # B, C, D
-        after = before + np.array(sizes[:3]) if put else before
+        after = before + np.array(sizes[:3]) if fitted else before
         ratio = float(np.prod(after) / np.prod(before))
         later = as_float64([*(ratio / after), 0.0])
         earlier = as_float64([*(-ratio / before), 0.0])
-        if put:
-            known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
+        if fitted:
+            state, told = fitted
+            known = {**dict(zip(m.names, sizes, strict=True)), **state.changes}
             value = ratio - 1.0
         else:
+            told = self.at_one_point
             known = told.beside(m.id)
             value = (1.0 - cut) * float(later @ [known[n] for n in m.names])
         std = told.std_along(m.id, (later, earlier), known)

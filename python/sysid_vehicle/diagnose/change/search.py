@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from ...effects import Effect
-from ...errors import InvalidInput, NumericalError
+from ...errors import NumericalError
 from ...identify import Fit
 from ...rules import Rules
 from ...vehicle import AXLES, GRAVITY_MPS2
@@ -65,6 +65,8 @@ class Search:
     reference : Reference
     visited : dict of frozenset to Exact
         What was fitted, by what was put in.
+    failed : set of frozenset
+        What cannot be fitted.
     alike : Alike
         How like the reference the later driving is.
     """
@@ -74,8 +76,7 @@ class Search:
     ) -> None:
         self.before, self.start, self.rules = before, start, rules
         known = Pieces(before.driving)
-        self._pieces = (known, Pieces(start.driving, known))
-        self.alike = known.alike(start.driving)
+        self._pieces, self.alike = (known, Pieces(start.driving, known)), known.alike(start.driving)
         model, both = start.model, (before.driving, start.driving)
         free, lacked = set(model.free_names), {e.id for e in before.model.candidates}
         effects = tuple(
@@ -96,12 +97,12 @@ class Search:
         self.can = {m.id: m for m in fitted}
         self.may = [*fitted, *map(of_clock, clocks)]
         self.visited: dict[frozenset[str], Exact] = {}
+        self.failed: set[frozenset[str]] = set()
 
     @cached_property
     def singles(self) -> Competition:
         """What competes beside nothing, where what may have changed alone has been fitted."""
-        begin = self.reference.fitted(self.start, (), {}, {})
-        self.visited[frozenset()] = begin
+        begin = self.visited[frozenset()] = self.reference.fitted(self.start, (), {}, {})
         # Lines are drawn from the reference: where nothing may change it goes far from any car.
         told = self.told(replace(begin, fit=self.start, shift=np.zeros_like(begin.shift)))
         alone = [(e,) for e in told.alone if e in self.can][:_TRIED]
@@ -124,9 +125,7 @@ class Search:
             told = self.told(state)
             seen.add(state.put)
             self._visit(self._leading(told, state), told)
-            for effect in state.put:
-                for rival in in_place(effect, told, self.can):
-                    self._visit(instead(state.put, effect, rival), told)
+            self._visit_in_place(state, told)
             best, state = self._best(told, state), self.visited[frozenset(state.put)]
             best = self._better(state, told) if best is state else best
             if best.put in seen:
@@ -134,20 +133,27 @@ class Search:
             state = best
         return self._settled(told, state)
 
+    def _visit_in_place(self, state: Exact, told: Competition) -> None:
+        """What may be there in place of each effect that was put in."""
+        for few in [
+            instead(state.put, e, r) for e in state.put for r in in_place(e, told, self.can)
+        ]:
+            self._visit(few, told)
+
     def _in_twos(self) -> None:
         """Of each change that was fitted alone, that together with what lines name beside it."""
         for state in [s for s in self.visited.values() if s.put]:
-            with suppress(InvalidInput):  # tyres that are multiplied may be beyond any
-                told = self.told(state)
-                for more in beside(told, self.can, self.rules)[:_BESIDE]:
-                    start = dict.fromkeys(self.can[more].names, 0.0) | state.changes
-                    self._visit((*state.put, more), told, (start,))
+            told = self.told(state)
+            for more in beside(told, self.can, self.rules)[:_BESIDE]:
+                start = dict.fromkeys(self.can[more].names, 0.0) | state.changes
+                self._visit((*state.put, more), told, (start,))
 
     def _settled(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
         """What will be named has been put in, and not a rival of it: sizes are told beside it."""
         seen: set[tuple[str, ...]] = set()
         while state.put not in seen and len(seen) < _ROUNDS:
             seen.add(state.put)
+            self._visit_in_place(state, told)
             best = self._better(state, told)
             if best is not state:
                 state, told = best, self.told(best)
@@ -171,10 +177,9 @@ class Search:
 
     def _at_maximum(self, state: Exact) -> Exact:
         """The state where its likelihood is highest, as that of nothing is."""
-        if not state.climbed:
-            with suppress(NumericalError, np.linalg.LinAlgError):
-                self.visited[frozenset(state.put)] = self.reference.climbed(self.start, state)
-                self.visited[frozenset()] = self.reference.nothing
+        with suppress(NumericalError, np.linalg.LinAlgError):
+            self.visited[frozenset(state.put)] = self.reference.climbed(self.start, state)
+            self.visited[frozenset()] = self.reference.nothing
         return self.visited[frozenset(state.put)]
 
     def _shown(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
@@ -205,17 +210,16 @@ class Search:
                 if e not in state.put:
                     self._visit((*state.put, e), told)
             # What was fitted beside its rival may belong there, whatever lines lead to.
-            few, many = frozenset(state.put), len(state.put) + 1
-            more = [k for k in self.visited if few < k and len(k) == many and k not in gone]
-            found = [self.visited[k] for k in more]
+            few = frozenset(state.put)
+            more = {k for k in self.visited if few < k and len(k - few) == 1} - gone
+            found = [s for k, s in self.visited.items() if k in more]
             if not found:
                 break
             ratio = told.ratio_of(state.put)
             best = max((state, *found), key=lambda s: self.evidence(s, told, ratio))
             if best is state:
                 break
-            state = best
-            told = self.told(state)
+            state, told = best, self.told(best)
         return told, state
 
     def _off_nothing(self, effects: tuple[str, ...], state: Exact, told: Competition) -> float:
@@ -282,7 +286,7 @@ class Search:
                     )
                     for a, b, alone in ((rival, effect, state), (effect, rival, other))
                 )
-                prices = (told.price(s.put, s.sizes) for s in (state, other))
+                prices = (told.price(s.put, s.changes) for s in (state, other))
                 odds[rival] = 0.5 * (w - v) / ratio + next(prices) - next(prices)
         return odds
 
@@ -319,21 +323,17 @@ class Search:
         return leading(told, state.put, self.can)
 
     def _visit(
-        self,
-        put: tuple[str, ...],
-        told: Competition,
-        also: Sequence[Mapping[str, float]] = (),
+        self, put: tuple[str, ...], told: Competition, also: Sequence[Mapping[str, float]] = ()
     ) -> None:
-        if frozenset(put) in self.visited:
+        key, usual = frozenset(put), {n: u for e in put for n, u in self.can[e].usual.items()}
+        if key in self.visited or key in self.failed:
             return
-        usual = {
-            n: u for e in put for n, u in zip(self.can[e].names, self.can[e].scale, strict=True)
-        }
+        self.failed.add(key)
         with suppress(NumericalError, np.linalg.LinAlgError):
-            told_by_lines = {n: told.sizes[n] for n in usual}
-            exact = self.reference.fitted(self.start, put, told_by_lines, usual, also)
-            self.visited[frozenset(put)] = exact
-            self.visited[frozenset()] = self.reference.nothing
+            lines = {n: told.sizes[n] for n in usual}
+            exact = self.reference.fitted(self.start, put, lines, usual, also)
+            self.visited |= {key: exact, frozenset(): self.reference.nothing}
+            self.failed.remove(key)
 
     def lacking(self, effect: str, state: Exact, group: Sequence[str]) -> list[Exact]:
         """What was fitted, to its maximum, without an effect and all of its group.
@@ -358,11 +358,10 @@ class Search:
         Among what is likelier than nothing, and adds changes to each part of it, that by which
         these compare: what is added and only gains as a lack of the reference does is no change.
         """
-        price = told.price(state.put, state.sizes)
-        more = self.over_nothing(state, told, ratio) > 0.0 and not self._lacking_in_both(
-            state, ratio
-        )
-        return (state.among if more else state.reached) / ratio - price
+        some = self.over_nothing(state, told, ratio) > 0.0
+        more = some and not self._lacking_in_both(state, ratio)
+        likelihood = state.among if more else state.reached
+        return likelihood / ratio - told.price(state.put, state.changes)
 
     def _lacking_in_both(self, state: Exact, ratio: float) -> bool:
         """Whether some of what was put in does as well where it is in both drivings the same."""
@@ -378,16 +377,15 @@ class Search:
     def over_nothing(self, state: Exact, told: Competition, ratio: float) -> float:
         """By how much a state is likelier than that nothing changed [nats]."""
         nothing = self.visited[frozenset()].reached
-        return (state.reached - nothing) / ratio - told.price(state.put, state.sizes)
+        return (state.reached - nothing) / ratio - told.price(state.put, state.changes)
 
     def nothing(self, told: Competition) -> float:
         """Probability that nothing changed, beside all that was fitted.
 
         Likelihoods count as much less as intervals are wider by what a model lacks elsewhere.
         """
-        odds = [
-            self.over_nothing(s, told, told.width_of(s.put)) for s in self.visited.values() if s.put
-        ]
+        several = (s for s in self.visited.values() if s.put)
+        odds = [self.over_nothing(s, told, told.width_of(s.put)) for s in several]
         return float(scipy.special.expit(-scipy.special.logsumexp(odds))) if odds else 1.0
 
     def _best(self, told: Competition, state: Exact) -> Exact:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ... import _core
-from ..._common.arrays import FloatArray, as_float64
+from ..._common.arrays import FloatArray
 from ...errors import NumericalError
 from ...estimate import noise_range
 from ...identify import Fit
 from ...identify.search.box import free_box
-from ...identify.search.objective import LinearRows, Objective, Predicting
+from ...identify.search.objective import Objective, Predicting, gaussian_prior
 from ...model import Model
-from .beside_reference import Shared
 from .both_axles import Scaled
 from .both_drivings import BothDrivings
 
@@ -25,63 +23,36 @@ _FAR = 3.0  # usual sizes, within which a search begins
 _SHARES = (0.5, 1.0, 2.0)  # of the usual size, where it may begin too
 
 
-@dataclass(frozen=True, eq=False)
-class Together:
-    """What both drivings are fitted to.
+def together(
+    before: Fit, start: Fit, model: Model, own: Model | None, changed: Collection[str]
+) -> Objective:
+    """The likelihood of a driving and of the reference, with the priors of the fit of what stays.
 
-    Attributes
+    The reference is not approximated by its information: of tyres in their linear range a line
+    says that they may go where they cannot. Nor do its estimates have a prior: coefficients of
+    tyres that no driving tells one by one are far from them in the same car.
+
+    Parameters
     ----------
     before : Fit
         The reference.
-    place : dict of str to int
-        Columns of parameters in `shared`.
-    shared : Shared
+    start : Fit
+        Of whose driving it is.
+    model : Model
+    own : Model, optional
+        Of the reference; without, it is the likelihood of the one driving.
+    changed : collection of str
+        Parameters that may differ between both.
     """
-
-    before: Fit
-    place: dict[str, int]
-    shared: Shared
-
-    def objective(
-        self,
-        start: Fit,
-        model: Model,
-        own: Model | None,
-        loose: Sequence[str],
-        changed: Sequence[str],
-    ) -> Objective:
-        """The likelihood of a driving, and that of the reference, with priors of what stays.
-
-        The reference is not approximated by its information: of tyres in their linear range a
-        line says that they may go where they cannot.
-
-        Parameters
-        ----------
-        start : Fit
-            Of whose driving it is.
-        model : Model
-        own : Model, optional
-            Of the reference; without, it is the likelihood of the one driving.
-        loose : sequence of str
-            Parameters without a prior.
-        changed : sequence of str
-            Those that may differ between both.
-        """
-        model_before = self.before.model
-        names = [n for n in model_before.free_names if n not in loose]
-        at = [self.place[n] for n in names]
-        rows = np.zeros((len(names), _core.PARAMETERS))
-        root = np.sqrt(self.shared.precision[at])
-        rows[np.arange(len(names)), [model_before.parameters[n].column for n in names]] = root
-        centre = [model_before.value(n) + self.shared.centre[self.place[n]] for n in names]
-        stays = LinearRows(rows, as_float64(root * centre))
-        later = Scaled.of(start.driving, model)
-        problem: Predicting = later
-        if own is not None:
-            shared = [own.parameters[n].column for n in own.free_names if n not in changed]
-            before = Scaled.of(self.before.driving, own)
-            problem = BothDrivings(later, before, own.vector(), shared)
-        return Objective(problem, (stays,), *noise_range(model.vehicle, start.driving))
+    known = before.model.parameters
+    priors = {known[n].column: p for n, p in before.model.priors.items() if n not in changed}
+    later = Scaled.of(start.driving, model)
+    problem: Predicting = later
+    if own is not None:
+        shared = [own.parameters[n].column for n in own.free_names if n not in changed]
+        problem = BothDrivings(later, Scaled.of(before.driving, own), own.vector(), shared)
+    stays = gaussian_prior(_core.PARAMETERS, priors)
+    return Objective(problem, stays, *noise_range(model.vehicle, start.driving))
 
 
 def starts_of(
