@@ -7,6 +7,7 @@ import pytest
 
 from sysid_vehicle import Driving, Fit, Model, drive, manoeuvres
 from sysid_vehicle.identify import refine
+from sysid_vehicle.study.ahead.beyond import Beyond
 from sysid_vehicle.study.judge.useful import useless
 from sysid_vehicle.study.results.added import AddedEffect
 
@@ -32,6 +33,19 @@ def test_what_the_car_has_is_of_use_and_what_acts_on_nothing_is_not(
     assert useless((missing, lagging, heavier), elsewhere) == {"gyro_bias"}
     # Of one step it is told as a whole.
     assert useless((missing, heavier), elsewhere) == frozenset()
+
+
+def test_what_alone_predicts_better_is_of_use_though_no_single_error_shows_it(
+    missing: Fit, elsewhere: Driving
+) -> None:
+    biased = refine(missing.model.add("gyro_bias"), missing.driving, missing.noise)
+    sure, unsure = (Beyond((1.0, 0.8), 0.2, low, 0.4, 1.0) for low in (0.1, -0.1))
+    assert useless((missing, biased), elsewhere, explained=unsure) == {"gyro_bias"}
+    assert useless((missing, biased), elsewhere, explained=sure) == frozenset()
+    # Beside what does predict better the rest is of no use all the same.
+    lagging = refine(missing.model.add("steer_lag"), missing.driving, missing.noise)
+    heavier = refine(lagging.model.add("gyro_bias"), missing.driving, lagging.noise)
+    assert useless((missing, lagging, heavier), elsewhere, explained=sure) == {"gyro_bias"}
 
 
 def test_a_model_that_errs_more_is_of_no_use(missing: Fit, elsewhere: Driving) -> None:

@@ -165,7 +165,9 @@ class Judge:
         told = in_the_light_of(decision, alone)
         if wide is not None:
             told = as_unsure(told, estimates_of(fit, wide), fit, rules)
-        idle = before(asks.ends, lambda: useless(fits, self.test, rules), frozenset[str]())
+        idle = before(
+            asks.ends, lambda: useless(fits, self.test, rules, explained), frozenset[str]()
+        )
         one = before(asks.ends, self._one_for_all, "")
         return Study(
             verdict=decision.verdict,
