@@ -141,7 +141,7 @@ def diagnose(
             left,
             rules,
             board.scores,
-            family | {c.id: max(c.p_value, family[c.id]) for c in told if c.fit is not None},
+            family | {c.id: 1.0 for c in told if c.fit is not None and c.p_value == 1.0},
             proposed=proposed,
             unfollowed=unfollowed,
         )

@@ -379,7 +379,7 @@ def test_the_text_reads_like_the_equations(truth: sv.Model) -> None:
     for line in (
         "# slip angles",
         "delta = delta * (1.0 + steer_ratio_ratio_error)",
-        "alpha_f = delta - atan2(v_road + l_f * r, v_x)",
+        "alpha_f = delta - atan2(v_road + l_f_times_r, v_x)",
         "lag_rate = fmin(1.0 / steer_lag_time_constant_s, 4000.0)",
         "steer_lag_rate = lag_rate * (delta - steer_lag)",
         "grip_r = grip_r * (1.0 - lateral_load_transfer_loss_rear * term_",

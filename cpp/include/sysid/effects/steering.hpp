@@ -176,9 +176,10 @@ struct SteerCompliance : Effect {
         using std::cos;
         using std::sin;
         using std::sqrt;
-        const S logged = slip_angle(w.v_x, S(w.v_road + w.l_f * w.r), w.delta);
+        const S logged =
+            named("alpha_untwisted", slip_angle(w.v_x, S(w.v_road + w.l_f * w.r), w.delta));
         const S stiff = w.B_f * w.C_f;
-        const S peak = p[0] * w.fz0_f * w.mu_peak_f;
+        const S peak = named("largest_twist", S(p[0] * w.fz0_f * w.mu_peak_f));
         // To begin with, a tyre whose force is D B C alpha / (1 + B C |alpha|).
         const S size = if_below(logged, 0.0, S(-logged), logged);
         const S less = 1.0 + peak * stiff - stiff * size;
@@ -192,7 +193,7 @@ struct SteerCompliance : Effect {
                 peak * cos(angle) * stiff * (1.0 - w.E_f + w.E_f / (1.0 + x * x)) / (1.0 + y * y);
             // What stiffens the steering by more than the tyre bends it has no angle.
             const S gain = 1.0 + if_below(slope, kLeastSlope, S(kLeastSlope), slope);
-            twist = twist + (peak * sin(angle) - twist) / gain;
+            twist = named("twist", S(twist + (peak * sin(angle) - twist) / gain));
         }
         w.delta = w.delta - twist;
     }

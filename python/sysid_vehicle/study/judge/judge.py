@@ -45,7 +45,7 @@ from .matters import buried, sufficient
 from .one_for_all import one_for_all
 from .slow import slow_forces
 from .structure import structure
-from .useful import useless
+from .useful import NONE, useless
 from .verdict import facts_of, in_the_light_of
 
 # What a time limit may leave unknown, in words.
@@ -165,9 +165,7 @@ class Judge:
         told = in_the_light_of(decision, alone)
         if wide is not None:
             told = as_unsure(told, estimates_of(fit, wide), fit, rules)
-        idle = before(
-            asks.ends, lambda: useless(fits, self.test, rules, explained), frozenset[str]()
-        )
+        idle = before(asks.ends, lambda: useless(fits, self.test, explained, rules), NONE)
         one = before(asks.ends, self._one_for_all, "")
         return Study(
             verdict=decision.verdict,

@@ -18,9 +18,11 @@ from ..ahead.along_the_car import changes_of
 from ..ahead.beyond import Beyond
 from ..validation import AHEAD, fall_in_error
 
+NONE: frozenset[str] = frozenset()
+
 
 def useless(
-    fits: Sequence[Fit], test: Driving, rules: Rules = USUAL, explained: Beyond | None = None
+    fits: Sequence[Fit], test: Driving, explained: Beyond | None = None, rules: Rules = USUAL
 ) -> frozenset[str]:
     """Find added effects with which no error on validation data is shown to fall, in their step.
 
@@ -32,9 +34,9 @@ def useless(
         From the baseline to the final model.
     test : Driving
         Validation data.
-    rules : Rules
     explained : Beyond, optional
         What all together take off the errors 1 to 5 s ahead on validation data.
+    rules : Rules
     """
     steps = [pair for pair in pairwise(fits) if not serves(*pair, test, rules)]
     found = frozenset(
