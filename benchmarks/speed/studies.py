@@ -38,16 +38,23 @@ USUAL = ("effect=6", "pair=3", "group removed=2", "outside=2", "null=2")
 Outcome = dict[str, Any]
 
 
-def _manoeuvres(driving: str, ease: float) -> tuple[sv.manoeuvres.Manoeuvre, ...]:
-    """The drives of the exam, 52 to 65 s each."""
-    m = sv.manoeuvres
-    made: dict[str, Callable[[], sv.manoeuvres.Manoeuvre]] = {
-        "ramp": lambda: m.ramp_steer((18.0, 22.5, 27.0), 8.6 * ease, 4.0),
-        "sweep": lambda: m.sine_sweep(60.0, 25.0, 3.5 * ease),
-        "step": lambda: m.step_steer((17.0, 20.0, 23.0, 27.0), (3.0 * ease, 6.0 * ease)),
-        "lap": lambda: m.lap(60.0, 8.6 * ease),
-    }
-    return (made[driving](),)
+# The drives of the exam of one manoeuvre, 52 to 65 s each; they are eased near the limit.
+SINGLE: dict[str, Callable[[float], sv.manoeuvres.Manoeuvre]] = {
+    "ramp": lambda ease: sv.manoeuvres.ramp_steer((18.0, 22.5, 27.0), 8.6 * ease, 4.0),
+    "sweep": lambda ease: sv.manoeuvres.sine_sweep(60.0, 25.0, 3.5 * ease),
+    "step": lambda ease: sv.manoeuvres.step_steer(
+        (17.0, 20.0, 23.0, 27.0), (3.0 * ease, 6.0 * ease)
+    ),
+    "lap": lambda ease: sv.manoeuvres.lap(60.0, 8.6 * ease),
+}
+
+
+_of_the_exam = truths.manoeuvres
+
+
+def _manoeuvres(trial: design.Trial, ease: float) -> tuple[sv.manoeuvres.Manoeuvre, ...]:
+    *_, course = _of_the_exam(trial, ease)
+    return SINGLE[trial.driving](ease), course
 
 
 def drawn(draw: Sequence[str], seed: int) -> tuple[design.Trial, ...]:
@@ -56,7 +63,7 @@ def drawn(draw: Sequence[str], seed: int) -> tuple[design.Trial, ...]:
     grid = [
         t
         for t in design.full(1, 25)
-        if t.driving != "all" and (t.severity >= 1.0 or t.kind == "null")
+        if t.driving in SINGLE and (t.severity >= 1.0 or t.kind == "null")
     ]
     return design.stratified(tuple(grid), each, seed)
 
