@@ -134,6 +134,9 @@ class Facts:
         (`unforeseen`).
     slow : tuple of str
         Disturbances of the final model that last as long as any may, in words.
+    one_for_all : str
+        An effect that was not sought and, in place of all that was added, explains the training
+        data as well.
     """
 
     fitted: Tested
@@ -150,6 +153,7 @@ class Facts:
     unopposed: bool = False
     unforeseen: bool = False
     slow: tuple[str, ...] = ()
+    one_for_all: str = ""
 
     def with_own(
         self,

@@ -18,7 +18,7 @@ from sysid_vehicle import (
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study.judge.between_logs import no_effect_but_the_log, told_differently
-from sysid_vehicle.study.judge.one_for_all import one_for_all
+from sysid_vehicle.study.judge.one_for_all import OneForAll, one_for_all
 from sysid_vehicle.study.results.added import AddedEffect
 
 
@@ -61,7 +61,8 @@ def test_what_an_effect_of_the_log_stands_in_for_is_told(two_sets: Fit) -> None:
     heat = two_sets.model.add("tyre_temperature")
     final = refine(heat, two_sets.driving, two_sets.noise)
     assert final.log_likelihood > two_sets.log_likelihood + 50.0
-    said = one_for_all(two_sets, final, ("tyre_temperature",), (), USUAL)
+    said, effect = one_for_all(two_sets, final, ("tyre_temperature",), (), USUAL)
+    assert effect == ""
     assert said.startswith("tyre_temperature may be what differs between the training logs")
     assert "(cornering stiffness front " in said
 
@@ -93,6 +94,6 @@ def test_what_a_simpler_reason_explains_is_not_confirmed(
 
     assert added().grade == "confirmed"
     judge = importlib.import_module("sysid_vehicle.study.judge.judge")
-    monkeypatch.setattr(judge, "one_for_all", lambda *_: "steer_lag may be a mistake")
+    monkeypatch.setattr(judge, "one_for_all", lambda *_: OneForAll("steer_lag may be a mistake"))
     with pytest.warns(SysidWarning, match="steer_lag may be a mistake"):
         assert added().grade == "plausible"

@@ -5,8 +5,9 @@ import pytest
 from sysid_vehicle import Fit, Log, Model, SysidWarning, drive, identify, improve, manoeuvres
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.study.judge.one_for_all import one_for_all
+from sysid_vehicle.study.judge.one_for_all import OneForAll, one_for_all
 
+NONE = OneForAll("")
 NAMES = ("force_gain", "yaw_inertia", "aero_drag")
 
 
@@ -31,7 +32,9 @@ def all_but(fit: Fit, *names: str) -> set[str]:
 
 
 def test_a_wrong_mass_that_is_not_sought_is_pointed_at(heavy: Fit) -> None:
-    said = one_for_all(heavy, with_all(heavy), NAMES, all_but(heavy, "mass", "gyro_bias"), USUAL)
+    told = one_for_all(heavy, with_all(heavy), NAMES, all_but(heavy, "mass", "gyro_bias"), USUAL)
+    said, effect = told
+    assert effect == "mass"
     assert said.startswith("force_gain, yaw_inertia, aero_drag may be one error: mass, which was")
     assert "(relative_error -0.09" in said
     assert "check mass_kg of the vehicle file" in said
@@ -41,12 +44,12 @@ def test_a_wrong_mass_that_is_fixed_in_the_model_is_pointed_at(heavy: Fit) -> No
     known = heavy.model.add("mass").with_fixed(["mass.relative_error"])
     fit = refine(known, heavy.driving, heavy.noise)
     said = one_for_all(fit, with_all(fit), NAMES, all_but(fit), USUAL)
-    assert "check mass_kg of the vehicle file" in said
+    assert "check mass_kg of the vehicle file" in said.said
 
 
 def test_nothing_is_said_where_all_was_sought_or_one_effect_found(heavy: Fit) -> None:
-    assert one_for_all(heavy, with_all(heavy), NAMES, all_but(heavy), USUAL) == ""
-    assert one_for_all(heavy, heavy, NAMES[:1], all_but(heavy, "mass"), USUAL) == ""
+    assert one_for_all(heavy, with_all(heavy), NAMES, all_but(heavy), USUAL) == NONE
+    assert one_for_all(heavy, heavy, NAMES[:1], all_but(heavy, "mass"), USUAL) == NONE
 
 
 def test_effects_with_causes_of_their_own_are_no_one_error(start: Model, truth: Model) -> None:
@@ -57,7 +60,7 @@ def test_effects_with_causes_of_their_own_are_no_one_error(start: Model, truth: 
     )
     fit = identify(start, log, starts=1)
     final = refine(fit.model.add(*found), fit.driving, fit.noise)
-    assert one_for_all(fit, final, found, all_but(fit, "mass", "force_gain"), USUAL) == ""
+    assert one_for_all(fit, final, found, all_but(fit, "mass", "force_gain"), USUAL) == NONE
 
 
 def test_a_study_warns_of_it(heavy: Fit, lap: Log, truth: Model) -> None:

@@ -9,15 +9,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ..._common.arrays import FloatArray
-from ..._common.text import few, number, unit_after
 from ..._common.threads import before, in_parallel
 from ...compare import Comparison, compare
 from ...diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus, widened
-from ...errors import warn
 from ...estimate import Driving
-from ...identify import Estimate, Fit, driving_of
+from ...identify import Fit, driving_of
 from ...log import unexcited
-from ...rules import LACKING, USUAL, Facts, Rules, incomplete, standing, verdict
+from ...rules import LACKING, Facts, Rules, incomplete, standing, verdict
 from ...sensors import Kinematics, backed
 from ..ahead.beyond import Beyond
 from ..ahead.own_share import (
@@ -31,18 +29,18 @@ from ..ahead.own_share import (
 )
 from ..limit import Judging
 from ..results.added import added_by, of_one_step
-from ..results.next_steps import SHORT_S
 from ..results.widened import as_unsure, estimates_of
 from ..search.search import Trail
 from ..search.steps import insignificant, way
 from ..search.together import in_place_of
 from ..study import Study
-from ..validation import at_its_best, beyond_noise_ahead, serving, together, twice
+from ..validation import at_its_best, beyond_noise_ahead, serving, together
 from .answers import answers_of
+from .cautions import cautions
 from .contested import spoken_against
 from .foretold import foretold
 from .matters import buried, sufficient
-from .one_for_all import one_for_all
+from .one_for_all import OneForAll, one_for_all
 from .slow import slow_forces
 from .structure import structure
 from .useful import NONE, useless
@@ -156,6 +154,8 @@ class Judge:
         if self.added and incomplete(facts, rules):
             facts = self._with_shares(facts, explained)
             alone, facts = self._contested(rivals, alone, facts)
+        one = before(asks.ends, self._one_for_all, OneForAll(""))
+        facts = replace(facts, one_for_all=one.effect)
         decision = verdict(facts, rules)
         fits, shared = (story, ()) if endless else self._way()
         on_train |= self._compared([f for f in fits if f not in on_train])
@@ -166,7 +166,6 @@ class Judge:
         if wide is not None:
             told = as_unsure(told, estimates_of(fit, wide), fit, rules)
         idle = before(asks.ends, lambda: useless(fits, self.test, explained, rules), NONE)
-        one = before(asks.ends, self._one_for_all, "")
         return Study(
             verdict=decision.verdict,
             fits=tuple(fits),
@@ -182,7 +181,7 @@ class Judge:
                 alone,
                 decision,
                 facts,
-                self.added if one else shared,
+                self.added if one.said else shared,
                 rules,
                 estimates_of(fit, wide),
                 idle,
@@ -191,7 +190,7 @@ class Judge:
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,
-            warnings=_warnings(self.trail, late, self.test, rules, one),
+            warnings=cautions(self.trail, late, self.test, rules, one.said),
             seconds=time.perf_counter() - began,
             rules=rules,
             explained=explained,
@@ -208,7 +207,7 @@ class Judge:
             widened=wide,
         )
 
-    def _one_for_all(self) -> str:
+    def _one_for_all(self) -> OneForAll:
         asked = {*self.lacked, *self.kinematics.settles}
         return one_for_all(self.trail.fits[0], self.fit, self.added, asked, self.rules)
 
@@ -329,72 +328,3 @@ class Judge:
             _TOGETHER, lambda: together_by_motion(self.outer, self.added, self.test, self.rules)
         )
         return facts if motions is None else facts.with_motions(motions)
-
-
-def _warnings(
-    trail: Trail, late: Sequence[str], test: Driving, rules: Rules = USUAL, one: str = ""
-) -> tuple[str, ...]:
-    fit, driving = trail.fit, trail.fit.driving
-    found = twice(driving.logs, test.logs)
-    if one:
-        found.append(one)
-        warn(one)
-    if trail.stopped or late:
-        found.append(_cut_short(trail.stopped, late))
-        warn(found[-1])
-    if trail.full:
-        most, remedy = "", "raise `most_effects` (`--max-effects`)"
-        if trail.short:
-            most, remedy = f", one for each {rules.lasts:g} s of training data", "record more"
-        found.append(
-            f"the search ended with as many effects as may be added{most}; there is evidence for "
-            f"{few(trail.full)}: {remedy}"
-        )
-    if trail.harmful:
-        found.append(
-            f"{' and '.join(trail.harmful)} removed again: where such an effect acts, errors 1 to "
-            "5 s ahead of validation data are larger with it, beside the others"
-        )
-    if trail.taken_back:
-        found.append(
-            f"{' and '.join(trail.taken_back)} removed again: errors 1 to 5 s ahead fall with the "
-            "parameters that predict best, but grow with those of the likelihood, whatever the "
-            "driving leaves open"
-        )
-    if driving.usable_s < SHORT_S:
-        found.append(
-            f"{driving}: too short to tell many effects apart; record {SHORT_S:.0f} s or more, "
-            "with steps, sweeps and corners near the limit"
-        )
-        warn(found[-1])
-    for log in driving.logs:
-        found += [f"{log.name}: {text}" for text in log.missing().values()]
-    found += map(str, fit.against_priors)
-    given = {n for n, told in fit.model.settings.items() if told.bounds is not None}
-    found += [_noted(e, e.name in given) for e in fit.estimates if e.note]
-    if not fit.converged:
-        found.append("the final fit did not converge; its intervals may be too short")
-        warn(found[-1])
-    return tuple(dict.fromkeys(found))
-
-
-def _noted(e: Estimate, bounded: bool) -> str:
-    """Why an estimate says little, in words; of a user's bound, what lies beyond it."""
-    if e.note != "at bound":
-        return f"{e.name}: {e.note} with this driving"
-    unit = unit_after(e.unit)
-    text = f"{e.name}: ends at its bound {number(e.value)}{unit} with this driving"
-    if e.unbounded is None or not bounded:
-        return text
-    return f"{text}; the data lead beyond it, to about {number(e.unbounded[0])}{unit}"
-
-
-def _cut_short(stopped: Sequence[str], late: Sequence[str]) -> str:
-    """What the time limit left out, in one line."""
-    cut = []
-    if stopped:
-        cut.append(f"ended the search with {few(stopped)} still to be tried")
-    if late:
-        cut.append(f"left open {'; '.join(late)}")
-    unsure = "; without that neither the verdict nor the effects named are certain" if late else ""
-    return f"the time limit {', and '.join(cut)}{unsure}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,9 +31,24 @@ _IN_THE_FILE = {
 }
 
 
+class OneForAll(NamedTuple):
+    """What explains all that was found.
+
+    Attributes
+    ----------
+    said : str
+        A sentence; empty where nothing does.
+    effect : str
+        The effect, where it is one that was not sought.
+    """
+
+    said: str
+    effect: str = ""
+
+
 def one_for_all(
     baseline: Fit, final: Fit, added: Sequence[str], sought: Collection[str], rules: Rules
-) -> str:
+) -> OneForAll:
     """Say which slip of the vehicle file, difference of logs, or other effect explains all of it.
 
     An effect that was left out, or is fixed, and is refitted in the place of all that were added
@@ -50,16 +66,14 @@ def one_for_all(
 
     Returns
     -------
-    str
-        A sentence; empty where there is no such slip or effect, and the logs tell one car.
+    OneForAll
+        Empty where there is no such slip or effect, and the logs tell one car.
     """
     slip = slip_of_the_file(final, added, rules)
     if not slip:
         slip = no_effect_but_the_log(baseline, final, added, rules)
-    if slip:
-        return slip
-    if len(added) < 2:
-        return ""
+    if slip or len(added) < 2:
+        return OneForAll(slip)
     enough = merit(final)
     found = [
         (e, fit)
@@ -67,17 +81,18 @@ def one_for_all(
         if merit(fit) >= enough
     ]
     if not found:
-        return ""
+        return OneForAll("")
     e, fit = max(found, key=lambda at: merit(at[1]))
     sizes = ", ".join(
         f"{p.name} {with_error(fit[n].value, fit[n].std, fit[n].bounds)}{unit_after(p.unit)}"
         for n, p in e.named.items()
     )
     where = _IN_THE_FILE.get(e.id, "what is known of it")
-    return (
+    said = (
         f"{few(added)} may be one error: {e.id}, which was not sought, explains the training data "
         f"as well in place of all of them ({sizes}); check {where}, or let the study seek {e.id}"
     )
+    return OneForAll(said, e.id)
 
 
 def _fixed(baseline: Fit) -> list[tuple[Effect, Fit]]:
