@@ -54,4 +54,5 @@ PYBIND11_MODULE(_core, m) {
     register_online_mu_slip(m);
     register_twin(m);
     register_online_sideslip(m);
+    register_banded(m);
 }

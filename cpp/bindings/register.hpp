@@ -30,5 +30,6 @@ void register_lab_tyres(pybind11::module_& m);
 void register_online_mu_slip(pybind11::module_& m);
 void register_twin(pybind11::module_& m);
 void register_online_sideslip(pybind11::module_& m);
+void register_banded(pybind11::module_& m);
 
 }  // namespace sysid::bindings

@@ -60,8 +60,8 @@ class Road:
         self.changes = sparse.diags([-1.0, 1.0], [0, 1], shape=(n - 1, n), format="csr")
 
     def band(self, std: float) -> Band:
-        told = sparse.eye(self.read.size, format="csr") / self.noise**2
-        return Band(sparse.csr_matrix(told + self.changes.T @ self.changes / std**2))
+        told = sparse.eye(self.read.size, format="csr") / self.noise
+        return Band(sparse.vstack([told, self.changes / std], format="csr"))
 
     def settled(self) -> tuple[Unevenness, int]:
         slope = Unevenness(self.changes)

@@ -344,7 +344,7 @@ def _begin(
             rows.append(j / std)
             values.append(r.values / std)
     j = scipy.sparse.vstack(rows, format="csr")
-    return Band(j.T @ j).solve(j.T @ np.concatenate(values)), colours
+    return Band(j).solve(j.T @ np.concatenate(values)), colours
 
 
 def _levels(readings: Sequence[Readings], grid: Grid) -> scipy.sparse.csr_matrix:

@@ -8,29 +8,36 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ...errors import NumericalError
 from .colour import Colour
 from .equations import Readings, expected_of, predict
 from .motion import Grid, IntArray
 
-_AT_ONCE = 32  # right-hand sides that are solved for together
-_NOTHING = 1e-18  # of a variance
 _OUTLIER = 4.0  # whitened errors beyond count less (Huber)
 
 
 class Band:
-    """Cholesky factor of a banded information matrix."""
+    """Cholesky factor of a banded information matrix.
 
-    def __init__(self, h: scipy.sparse.csr_matrix) -> None:
-        h = h.tocsr()
-        below = np.repeat(np.arange(h.shape[0]), np.diff(h.indptr)) - h.indices
-        self.width = int(below.max())
-        self.ab = np.zeros((self.width + 1, h.shape[0]))
-        lower = below >= 0
-        self.ab[below[lower], h.indices[lower]] = h.data[lower]
+    Parameters
+    ----------
+    rows : csr_matrix, shape (m, n)
+        Whitened equations: the information is their product with themselves.
+
+    Raises
+    ------
+    NumericalError
+        They leave something of the motion open.
+    """
+
+    def __init__(self, rows: scipy.sparse.csr_matrix) -> None:
+        lower = _core.banded_gram(rows.indptr, rows.indices, rows.data, rows.shape[1]).T
         try:
-            self.factor = scipy.linalg.cholesky_banded(self.ab, lower=True, check_finite=False)
+            self.factor = scipy.linalg.cholesky_banded(
+                lower, lower=True, overwrite_ab=True, check_finite=False
+            )
         except scipy.linalg.LinAlgError as error:
             raise NumericalError(
                 "the motion cannot be told from these channels; check that vx_mps, "
@@ -45,36 +52,9 @@ class Band:
     def variances(self, rows: scipy.sparse.csr_matrix) -> FloatArray:
         """Variances of sums of coefficients, one for each row.
 
-        The square of what the factor makes of a row, from its first coefficient on: before it
-        there is nothing.
+        The square of what the factor makes of a row.
         """
-        rows = rows.sorted_indices()
-        first, last = rows.indices[rows.indptr[:-1]], rows.indices[rows.indptr[1:] - 1]
-        order = np.argsort(first, kind="stable")
-        found = np.empty(rows.shape[0])
-        for some in (order[k : k + _AT_ONCE] for k in range(0, order.size, _AT_ONCE)):
-            begin = int(first[some[0]])
-            end = int(last[some].max()) + 1
-            found[some] = self._squares(rows[some, begin:], end - begin, begin)
-        return as_float64(found)
-
-    def _squares(self, rows: scipy.sparse.csr_matrix, filled: int, begin: int) -> FloatArray:
-        """Sums of the squares of what the factor makes of rows that begin at coefficient `begin`.
-
-        What it makes of them dies away: once a width of it adds nothing any more, nothing does.
-        """
-        length = filled
-        while True:
-            length = min(2 * (length + self.width), rows.shape[1])
-            right = np.asfortranarray(rows[:, :length].toarray().T)
-            factor = self.factor[:, begin : begin + length]
-            half, info = scipy.linalg.lapack.dtbtrs(factor, right, uplo="L")
-            if info:
-                raise NumericalError("the posterior of the motion is singular")
-            squares = as_float64(np.sum(half**2, axis=0))
-            end = np.sum(half[-self.width :] ** 2, axis=0)
-            if length == rows.shape[1] or np.all(end <= _NOTHING * squares):
-                return squares
+        return _core.banded_squares(self.factor.T, rows.indptr, rows.indices, rows.data)
 
     def draw(self, z: FloatArray) -> FloatArray:
         """Solve with the transposed factor: normal numbers become draws of the posterior."""
@@ -212,10 +192,10 @@ def normal_equations(
     )
     jt = np.concatenate([np.zeros((rows.shape[0], faults.size)), *_rooted(system.by_faults, roots)])
     left = np.concatenate([-(rows @ x), *_rooted(system.white, roots)])
-    back = j.T.tocsr()
-    h, b, hxt = back @ j, back @ left, back @ jt
+    back = j.T
+    b, hxt = back @ left, back @ jt
     htt, bt = prior + jt.T @ jt, jt.T @ left - prior @ faults
-    band = Band(h)
+    band = Band(j)
     across = band.solve(hxt)
     information = as_float64(htt - hxt.T @ across)
     step = as_float64(np.linalg.solve(information, bt - across.T @ b))
