@@ -139,7 +139,7 @@ class Nominal:
     mass_kg, yaw_inertia_kgm2, lf_m, lr_m, cg_height_m : float
         See :class:`~sysid_vehicle.Vehicle`.
     stiffness_front, stiffness_rear : float
-        Cornering stiffness per vertical load [1/rad]: a guess, not the plant's own.
+        Cornering stiffness per vertical load [1/rad]: a guess, which the plant need not have.
     drag_nspm : float
         Linear drag [N s/m].
     gravity_mps2 : float
@@ -165,11 +165,15 @@ class Nominal:
 
     @classmethod
     @typed
-    def of(cls, vehicle: Vehicle, stiffness: float = 50.0) -> Nominal:
-        """Take mass and geometry from a vehicle, and one stiffness for both axles."""
+    def of(cls, vehicle: Vehicle, stiffness: float | None = None) -> Nominal:
+        """Take mass and geometry from a vehicle, and one stiffness for both axles or its own."""
         v = vehicle
         inertia = v.yaw_inertia_kgm2 or v.usual_inertia_kgm2
-        return cls(v.mass_kg, inertia, v.lf_m, v.lr_m, v.cg_height_m, stiffness, stiffness)
+        front, rear = (
+            tyre.cornering_stiffness_per_load if stiffness is None else stiffness
+            for tyre in (v.tyre_front, v.tyre_rear)
+        )
+        return cls(v.mass_kg, inertia, v.lf_m, v.lr_m, v.cg_height_m, front, rear)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from .parts import Actuator, Controller, Nominal, Online, Sensors, Simulator
 
 _FORCE = Actuator(-8000.0, 6000.0, 60e3)
 _STEER = Actuator(-0.35, 0.35, 2.0)
+_GUESSED = 50.0  # stiffness per load of the published car's tyres, which have 63 1/rad
 _DRIVES_MPS2, _BRAKES_MPS2 = 2.5, 4.0  # what a car can at least, be it a lorry
 
 
@@ -99,7 +100,7 @@ class Setup:
 
     @classmethod
     @typed
-    def of(cls, plant: Model, stiffness: float = 50.0) -> Setup:
+    def of(cls, plant: Model, stiffness: float | None = None) -> Setup:
         """Drive any model, with mass and geometry known and the tyres guessed.
 
         Wheel forces are those of an ordinary car, and larger where these would not accelerate a
@@ -112,7 +113,8 @@ class Setup:
         plant : Model
             The car.
         stiffness : float
-            Guess of both axles' cornering stiffness per load [1/rad].
+            Guess of both axles' cornering stiffness per load [1/rad]; that of the vehicle's own
+            tyres if left out. A guess that is far too stiff loses the car near its limit.
         """
         mass_kg = plant.vehicle.mass_kg
         more = max(
@@ -131,7 +133,7 @@ class Setup:
     @classmethod
     def default(cls) -> Setup:
         """Return the published car at its full load, with the corrected loop."""
-        return cls.of(_example_plant())
+        return cls.of(_example_plant(), _GUESSED)
 
     @typed
     def core(

@@ -2,8 +2,9 @@
 
 from .against_car import check_car, times_wheelbase
 from .build import LEAST_STRETCH_S, LEAST_USABLE_S
-from .channels import CHANNELS, MEASURED, Channel
+from .channels import CHANNELS, COMMANDS, MEASURED, Channel
 from .columns import Columns, as_floats, listed, named_columns
+from .grid import own_period
 from .held import held_rows
 from .interpolate import interpolated
 from .laws.laws import Contradiction
@@ -14,6 +15,7 @@ from .together import check_excitation, copies, several_logs, unexcited
 
 __all__ = [
     "CHANNELS",
+    "COMMANDS",
     "LEAST_STRETCH_S",
     "LEAST_USABLE_S",
     "MEASURED",
@@ -32,6 +34,7 @@ __all__ = [
     "interpolated",
     "listed",
     "named_columns",
+    "own_period",
     "seconds_of_stamps",
     "several_logs",
     "standing",

@@ -11,7 +11,7 @@ from .._common.arrays import FloatArray
 from ..errors import InvalidInput, warn
 from ..vehicle import Vehicle
 from . import checks
-from .channels import CHANNELS
+from .channels import CHANNELS, COMMANDS
 from .columns import Columns, collect
 from .frozen import blank_frozen
 from .grid import at, check_time, own_period, to_grid
@@ -28,6 +28,10 @@ LEAST_USABLE_S = 5.0
 """Driving that something can be learned from, in all logs together [s]."""
 _CLOCK_S = 1e6  # a time that begins later is that of a clock, counted from a date
 _FILL_S = 0.1
+_STANDS = (
+    ", or, where it is a command that stands until the next one, put held = true for it in the "
+    "channel map"
+)
 _FILL_SLOW_S = 0.25  # an input that is sampled more slowly is not interpolated
 
 
@@ -154,13 +158,14 @@ def _fill_inputs(
     drive = "fx_n" if "fx_n" in columns else "ax_mps2"
     for name in ("steer_rad", drive):
         period = own_period(time_s, columns[name])
+        stands = _STANDS if name in COMMANDS else ""
         longest = max(_FILL_S, period if period <= _FILL_SLOW_S else 0.0)
         columns[name], gaps = fill_short_gaps(columns[name], max(1, round(longest * rate_hz)))
         if gaps and period * rate_hz > 1.5:
             notes.append(
                 f"{name}: holds a value only every {period:.3g} s and was interpolated in between, "
                 f"because the model needs this input at every sample; record it at "
-                f"{rate_hz:.4g} Hz"
+                f"{rate_hz:.4g} Hz{stands}"
             )
         elif gaps and name not in quiet:
             count = sum(b - a for a, b in gaps)

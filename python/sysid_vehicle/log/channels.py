@@ -57,3 +57,5 @@ MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 """Measured channels of the motion, in the core's order."""
 
 REQUIRED = tuple(name for name, channel in CHANNELS.items() if channel.required)
+COMMANDS = ("steer_rad", "fx_n")
+"""What may be a command, which stands until the next one."""

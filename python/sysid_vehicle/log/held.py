@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._common.arrays import FloatArray
-from .channels import CHANNELS
+from .channels import CHANNELS, COMMANDS
 
 _FEWEST_CHANGES = 20
 _ON_BEAT = 0.97  # share of the changes that lie whole holding times apart
@@ -39,7 +39,7 @@ def blank_held(
         rows = held_rows(values) if name in CHANNELS and name != "time_s" else 0.0
         if not rows:
             continue
-        repeated = _repeated(values, rows)
+        repeated = _repeated(values, rows, known=name in COMMANDS)
         result[name] = values.copy()
         result[name][repeated] = np.nan
         notes.append(
@@ -51,27 +51,28 @@ def blank_held(
     return result
 
 
-def _repeated(values: FloatArray, beat: float) -> npt.NDArray[np.intp]:
+def _repeated(values: FloatArray, beat: float, *, known: bool) -> npt.NDArray[np.intp]:
     """Rows at which the value before is written again.
 
     A channel that counts in quanta reads the same twice by chance, though no more often than it
     changes by one quantum: what is equal at a beat is a reading then, or only changes would count.
+    What drives the model is `known` where it stands: a force that is off for seconds is no gap.
     """
-    known = np.flatnonzero(np.isfinite(values))
-    step = np.diff(values[known])
+    there = np.flatnonzero(np.isfinite(values))
+    step = np.diff(values[there])
     first = np.append(0, np.flatnonzero(step) + 1)
     lengths = np.diff(first)
     several = np.maximum(np.round(lengths / beat), 1.0).astype(np.intp)
     sizes = np.abs(step[step != 0.0])
-    if np.sum(several - 1) > np.sum(sizes < 1.5 * sizes.min()):
+    if not known and np.sum(several - 1) > np.sum(sizes < 1.5 * sizes.min()):
         several[:] = 1
-    again = np.ones(known.size, dtype=bool)
+    again = np.ones(there.size, dtype=bool)
     again[first] = False
     more = several - 1
     nth = np.arange(np.sum(more)) - np.repeat(np.cumsum(more) - more, more) + 1
     begin, length, count = (np.repeat(a, more) for a in (first[:-1], lengths, several))
     again[begin + np.round(nth * length / count).astype(np.intp)] = False
-    return known[again]
+    return there[again]
 
 
 def held_rows(values: FloatArray) -> float:

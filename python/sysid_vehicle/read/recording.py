@@ -174,6 +174,15 @@ class Recording:
                 f"channel map, which `sysid-vehicle map` or sv.propose_channels proposes "
                 f"(channels are {listed(self.entries)})"
             )
+        lacking = [c for c in own if CHANNELS[c].required and c not in source]
+        if lacking:
+            others = [name for name in self.entries if name not in used]
+            needed = ", ".join(f"{channel}{near_names(channel, others)}" for channel in lacking)
+            raise InvalidInput(
+                f"missing column{'s' if len(lacking) > 1 else ''} {needed}; name its source in a "
+                f"channel map, which `sysid-vehicle map` or sv.propose_channels proposes (not used "
+                f"yet are {listed(others) or 'none'})"
+            )
         time_s, columns = self._rows(used, notes)
         # A channel that is found by the last part of its name is called by it from here on.
         called = {**{c: c for c in found}, **wanted}

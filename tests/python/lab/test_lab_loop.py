@@ -7,7 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput, RoadDisturbance, catalogue, manoeuvres, published
+from sysid_vehicle import (
+    InvalidInput,
+    Model,
+    RoadDisturbance,
+    catalogue,
+    example_vehicle,
+    manoeuvres,
+    published,
+)
 from sysid_vehicle.lab import (
     Actuator,
     ClosedLoop,
@@ -118,6 +126,20 @@ def test_half_and_double_stiffness_are_followed_all_the_same(stiffness: float) -
     assert not drive.too_hard
     assert drive.tracking["heading_rad"] < 0.004
     assert drive.tracking["vx_mps"] < 0.2
+
+
+def test_the_tyres_of_the_vehicle_file_are_what_the_loop_believes() -> None:
+    """Those of the published car, three times as stiff, were believed of any: cars were lost."""
+    car = example_vehicle()
+    setup = Setup.of(Model(car))
+    assert setup.nominal.stiffness_front == car.tyre_front.cornering_stiffness_per_load
+    assert setup.nominal.stiffness_rear == car.tyre_rear.cornering_stiffness_per_load
+    assert Setup.of(Model(car), 30.0).nominal.stiffness_rear == 30.0
+    hard = excitation.multi_sine(6.0, speed_mps=22.0, duration_s=20.0)
+    drive = run_closed_loop(hard, setup, seed=993411)
+    assert drive.lost_s is None
+    noise = setup.sensors.yaw_rate_radps.noise_std
+    assert drive.observer_error["yaw_rate_radps"] < 2.0 * noise  # ten times the noise before
 
 
 def test_a_wrong_mass_is_followed_all_the_same() -> None:

@@ -114,6 +114,17 @@ class TestHeld:
         # Of what is the same to the end of the record only the first is a reading.
         assert known.size > 495
 
+    def test_a_repeated_force_that_is_off_for_seconds_is_known(
+        self, rng: np.random.Generator
+    ) -> None:
+        """While a car stood its force was missing, and no run of the model went across that."""
+        force = np.repeat(rng.normal(0.0, 500.0, 1500), 2)
+        force[400:1000] = 0.0
+        known = np.isfinite(blank_held({"fx_n": force}, 100.0, [])["fx_n"])
+        np.testing.assert_array_equal(np.flatnonzero(known)[:1400], np.arange(0, 2800, 2))
+        # Of what is measured nobody knows whether it stands.
+        assert not np.isfinite(blank_held({"ay_mps2": force}, 100.0, [])["ay_mps2"])[402:1000].any()
+
 
 class TestSeveralClocks:
     """Sensors of one rate whose rows lie a constant few ms apart."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from log_formats import FACTORS, FAST, MAP, SLOW, UNITS, check_values, measured, read_told, table
 
-from sysid_vehicle.errors import SysidWarning
+from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.read import read_log
 
 
@@ -83,3 +83,21 @@ def test_an_attribute_names_the_columns_of_a_matrix(tmp_path: Path) -> None:
         del file["data"].attrs["units"]
     told = {c: {"column": name, "factor": FACTORS.get(c, 1.0)} for c, name in MAP.items()}
     check_values(read_log(tmp_path / "log.h5", told, check=False))
+
+
+def test_a_needed_channel_that_nothing_names_is_refused_with_all_that_is_left() -> None:
+    """Channels with times of their own that were not used were not listed, the speed among them."""
+    slow, fast = 0.02 * np.arange(500), 0.01 * np.arange(1000)
+    recording = {
+        "/state/linear/x": (slow, np.full(500, 20.0)),
+        "/imu/gyro_z": (fast, np.sin(fast)),
+        "/imu/acc_y": (fast, np.sin(fast)),
+        "/eps/angle": (fast, np.sin(fast)),
+    }
+    channels = {
+        "yaw_rate_radps": "/imu/gyro_z",
+        "ay_mps2": "/imu/acc_y",
+        "steer_rad": "/eps/angle",
+    }
+    with pytest.raises(InvalidInput, match=r"missing column vx_mps; .* yet are /state/linear/x\)"):
+        read_log(recording, channels)

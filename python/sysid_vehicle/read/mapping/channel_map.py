@@ -17,6 +17,7 @@ from ...log import CHANNELS, listed
 from ..recording import Recording
 from ..table import Table
 from .ground import Ground
+from .held import stand
 from .sideslip import SIDESLIP, lateral_speed
 from .source import Source, number, source_of, stated_factor, values_of
 
@@ -70,7 +71,8 @@ class ChannelMap:
         ``offset`` (0), ``despike`` (false), ``delay_s`` (0), ``sign`` (the column that is 1 where
         the value is negative), ``as_stated`` (whether a unit that the file states is converted:
         true where there is no factor, and false where there is one, 1 too) and, for ``vy_mps``,
-        ``sideslip`` (false), or ``false`` to ignore the channel;
+        ``sideslip`` (false), for ``steer_rad`` and ``fx_n`` ``held`` (false; a command that stands
+        until the next one), or ``false`` to ignore the channel;
         ``time_s = { rate_hz = 100 }`` numbers the rows of a file without time. ``[ground]`` has
         ``heading`` and ``east`` and ``north``, or ``speed`` and ``course``, in the same form, and
         for angles ``from``, which is ``"north"`` (clockwise) or ``"east"`` (anticlockwise).
@@ -198,7 +200,8 @@ class ChannelMap:
             result.update(self.ground.in_the_body(result, over_ground))
         self._slip_to_speed(result)
         _refuse_text(table, result)
-        return result
+        commands = {c: s.delay_s for c, s in self.sources.items() if s.held}
+        return stand(result, commands) if commands and "time_s" in result else result
 
     def _slip_to_speed(self, columns: dict[str, FloatArray]) -> None:
         """Make the lateral speed of a sideslip angle, if that is what the map or the file gives."""

@@ -112,7 +112,8 @@ _REFUSED: dict[str, str] = {
 # The last part of the name of what a sensor or a message tells of itself.
 _STATE = r"\b(counter|cnt|crc|checksum|valid|status|enabled?|override|fault|timeout)\b"
 # What a controller or a driver asks for, which stands behind what is measured.
-_WANTED = r"\b(cmd|command(ed)?|desired|requested|setpoint|manual)\b"
+_COMMAND = r"\b(cmd|command(ed)?|desired|requested|setpoint)\b"
+_WANTED = rf"{_COMMAND}|\bmanual\b"
 # Names that are those of a channel in its unit alone: a yaw in deg is an angle.
 _IN_ITS_UNIT = {"yaw_rate_radps": r"^(yaw|gyro|psi)$"}
 _SI = {
@@ -227,6 +228,11 @@ def _last_parts(name: str) -> list[str]:
 def si_unit(channel: str, name: str) -> str:
     """Return the SI unit of what a column of this name measures, if it is that channel's."""
     return "rad" if channel == "vy_mps" and is_sideslip(name) else _SI[channel]
+
+
+def is_command(name: str) -> bool:
+    """Tell whether a name is that of what a controller asks for."""
+    return re.search(_COMMAND, words(name)) is not None
 
 
 def is_sideslip(name: str) -> bool:

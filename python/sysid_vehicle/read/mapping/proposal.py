@@ -32,6 +32,7 @@ class Proposed:
     sign: str = ""
     mean_with: tuple[str, ...] = ()
     despike: bool = False
+    held: bool = False
 
     @property
     def source(self) -> Source:
@@ -44,6 +45,7 @@ class Proposed:
             mean_with=self.mean_with,
             despike=self.despike,
             as_stated=False,
+            held=self.held,
         )
 
 
@@ -105,6 +107,7 @@ class Proposal:
                 entry += f", mean_with = [{', '.join(map(_quoted, p.mean_with))}]"
             entry += ", sideslip = true" if p.sideslip else ""
             entry += ", despike = true" if p.despike else ""
+            entry += ", held = true" if p.held else ""
             entry += f", sign = {_quoted(p.sign)}" if p.sign else ""
             lines.append(f"{channel} = {{ {entry} }}")
         for name in self.missing:

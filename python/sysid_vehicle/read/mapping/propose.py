@@ -11,14 +11,14 @@ from ..._common.arrays import FloatArray
 from ..._common.files import as_path
 from ..._common.typed import typed
 from ...errors import InvalidInput, warn
-from ...log import CHANNELS, Columns, Log, standing
+from ...log import CHANNELS, COMMANDS, Columns, Log, standing
 from ...vehicle import Vehicle
 from ..recording import Recording
 from ..registry import blamed, recognised
 from ..units import factor_to
 from .ground import PARTS
 from .look import Signal, View, by_name, ended, even, ranked, stated
-from .names import is_sideslip, is_speed, si_unit, sign_of, wheel_of
+from .names import is_command, is_sideslip, is_speed, si_unit, sign_of, wheel_of
 from .navigation import (
     NAMED,
     Navigation,
@@ -363,7 +363,9 @@ class _Guess:
 
     def _channel(self, channel: str, name: str) -> Proposed:
         unit = self.view.unit(name, si_unit(channel, name))
+        held = channel in COMMANDS and is_command(name)
         reasons = [by_name(channel, name, unit), ended(channel, name, unit)]
+        reasons += ["a command, which stands until the next one"] if held else []
         return Proposed(
             name,
             self.factors.get(channel, 1.0),
@@ -374,6 +376,7 @@ class _Guess:
             self.signs.get(channel, ""),
             self.beside if channel == "vx_mps" else (),
             channel in self.lost,
+            held,
         )
 
     def _ground(self, nav: Navigation) -> dict[str, Proposed]:

@@ -12,13 +12,13 @@ import numpy as np
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.files import refuse_unknown
 from ...errors import InvalidInput, near_names
-from ...log import CHANNELS, MEASURED, held_rows, interpolated, listed
+from ...log import CHANNELS, COMMANDS, MEASURED, held_rows, interpolated, listed
 from ..table import Table
 from ..units import WHAT, factor_to, measures, states_nothing
 
 _SOURCE_KEYS = (
     *("column", "factor", "offset", "despike", "delay_s", "sideslip", "sign", "mean_with"),
-    "as_stated",
+    *("as_stated", "held"),
 )
 _GROUND = ("east", "north", "speed", "course", "heading")  # speeds and angles are measured too
 Between = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
@@ -34,7 +34,8 @@ class Source:
     value is negative, for buses that send size and sign apart. `mean_with`: columns of which the
     mean with `column` is taken, such as the speeds of both wheels of an axle. `as_stated`: a unit
     that the file states is converted, as neither factor nor offset is given; a factor of 1 that is
-    given says that the file is wrong.
+    given says that the file is wrong. `held`, for `steer_rad` and `fx_n` alone: the column is a
+    command that stands until the next one.
     """
 
     column: str
@@ -46,6 +47,7 @@ class Source:
     sign: str = ""
     mean_with: tuple[str, ...] = ()
     as_stated: bool = True
+    held: bool = False
 
     def __post_init__(self) -> None:
         if (self.factor, self.offset) != (1.0, 0.0):
@@ -101,7 +103,7 @@ class Source:
         What is measured keeps its noise as it is. An input may step, which only a straight line
         between samples follows; so may a channel whose values a logger repeats.
         """
-        if not self.delay_s:
+        if not self.delay_s or self.held:  # a command is brought there as it stands
             return values
         sharp = (channel in (*MEASURED, *_GROUND)) and not held_rows(values)
         return _earlier(time_s, values, self.delay_s, interpolated if sharp else _line)
@@ -205,6 +207,12 @@ def source_of(entry: Mapping[str, Any], channel: str, where: str) -> Source:
     despike, sideslip = (_flag(entry, key, where) for key in ("despike", "sideslip"))
     if sideslip and channel != "vy_mps":
         raise InvalidInput(f"{where}: sideslip = true makes a lateral speed; give it for vy_mps")
+    held = _flag(entry, "held", where)
+    if held and channel not in COMMANDS:
+        raise InvalidInput(
+            f"{where}: held = true says that a command stands until the next one; give it for "
+            f"{listed(COMMANDS)} alone"
+        )
     factor = number(entry, "factor", 1.0, where)
     if factor == 0.0:
         raise InvalidInput(f"{where}: factor = 0 would erase the channel; give its unit factor")
@@ -216,7 +224,8 @@ def source_of(entry: Mapping[str, Any], channel: str, where: str) -> Source:
     if not isinstance(sign, str):
         raise InvalidInput(f"{where}: sign = {sign!r}; give the name of the column with the sign")
     stated = _flag(entry, "as_stated", where) if "as_stated" in entry else "factor" not in entry
-    return Source(column, factor, offset, despike, delay_s, sideslip, sign, tuple(others), stated)
+    means = tuple(others)
+    return Source(column, factor, offset, despike, delay_s, sideslip, sign, means, stated, held)
 
 
 def _flag(entry: Mapping[str, Any], key: str, where: str) -> bool:

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -319,7 +319,9 @@ class Search:
         """The likeliest candidate, where it holds only together with one that is missing too.
 
         What the other one does to the validation data may be larger than what the first explains.
-        As neither has been seen to hold, they count only where together they leave nothing.
+        As neither has been seen to hold, they count only where together they leave nothing: two
+        that move the car along it alone, nothing of that motion, of which lateral errors say
+        nothing.
         """
         first = likeliest(dx)
         if first is None or first.fit is None:
@@ -327,13 +329,19 @@ class Search:
         if len(first.fit.model.effects) >= self.most_effects:
             return None
         beside = self._diagnosis(first.fit, trail.refitted)
-        step = first_that_holds(beside, trail.fit, self.test, self.ends)
-        if step is None or first.id not in step[1].model.effects:
-            return None
-        if omnibus(step[1], step[1].driving, self.rules).rejects:
-            return None
-        trail.note(beside, step[0])
-        return first, step[1]
+        tried = [beside]
+        if first.effect.along_alone:
+            along = tuple(c for c in beside.ranking if c.effect.along_alone)
+            tried.append(replace(beside, ranking=along))
+        for some in tried:
+            step = first_that_holds(some, trail.fit, self.test, self.ends)
+            if step is None or first.id not in step[1].model.effects:
+                continue
+            left = omnibus(step[1], step[1].driving, self.rules)
+            if not (left.rejects_along if some is not beside else left.rejects):
+                trail.note(beside, step[0])
+                return first, step[1]
+        return None
 
     def _diagnosis(self, fit: Fit, again: Sequence[str], refits: int = REFITS) -> Diagnosis:
         """All effects scored, some refitted again; where no time is left none is refitted."""
