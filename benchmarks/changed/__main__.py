@@ -75,6 +75,8 @@ def _of(truth: Truth, change: sv.Change) -> Row:
                 for e in leads)  # fmt: skip
     told: Row = {"effects": truth.effects, "size": truth.size, "group": bool(named), "first": first}
     told |= {"inside": None, "least": None}
+    told["weak"] = any(e.weak for e in right)
+    told["imitated"] = any(e.imitated_by for e in right)
     if right and truth.name:
         e = leads[0] if leads else right[0]
         value, std = _size(e, truth.name)
