@@ -41,6 +41,8 @@ class Saying:
     @cached_property
     def at_one_point(self) -> Competition:
         """Of tyres that did not change: their coefficients lie in a bent valley."""
+        if self.state.put:
+            return self.told
         return self.search.told(self.state, at_one_point=True)
 
     def change(self) -> Change:
