@@ -25,6 +25,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterable
+from math import isfinite
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -74,11 +75,14 @@ def _of(truth: Truth, change: sv.Change) -> Row:
                 for e in leads)  # fmt: skip
     told: Row = {"effects": truth.effects, "size": truth.size, "group": bool(named), "first": first}
     told |= {"inside": None, "least": None}
+    told["weak"] = any(e.weak for e in right)
+    told["imitated"] = any(e.imitated_by for e in right)
     if right and truth.name:
         e = leads[0] if leads else right[0]
         value, std = _size(e, truth.name)
         told["value"], told["std"] = value, std
-        told["inside"] = bool(abs(value - truth.size) < _SIDES * std)
+        # Of what the driving does not show the interval is anything.
+        told["inside"] = bool(abs(value - truth.size) < _SIDES * std) if isfinite(std) else None
         least = _least(e, truth.name)
         told["least"] = None if least is None else bool(abs(truth.size) >= least)
     return told

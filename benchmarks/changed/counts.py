@@ -45,6 +45,12 @@ def table(rows: Sequence[Row]) -> str:
         f"{sum(bool(r['wrong']) for r in rows if r['truths'])}, with something unknown "
         f"{sum(bool(r['unknown']) for r in rows if r['truths'])}"
     )
+    missed = [t for r in rows for t in r["truths"] if not t["group"]]
+    lines.append(
+        f"not named {len(missed)}, told that one of usual size is too weak to see "
+        f"{sum(t.get('weak', False) for t in missed)}, that it is imitated "
+        f"{sum(t.get('imitated', False) for t in missed)}"
+    )
     return "\n".join(lines)
 
 

@@ -47,12 +47,13 @@ def changed(
     """Tell what of a car changed since a reference: yesterday's log fits the model, today's not.
 
     What the reference left unexplained counts only as far as the later driving leaves more. Where
-    something seems to have changed, and the reference alone shows what is missing in its model
-    (`diagnose`), or an effect that is in both the same explains more than the change, the reference
-    lacks it: it is put into its model, and the drivings are compared again (`Change.lacks`). Both
-    are taken as independent; noise is that of the reference. What a model lacks acts otherwise at
-    other speeds or lateral accelerations: as far as the later driving is there (`Change.alike`),
-    standard errors hold what estimates differ by between pieces of the reference.
+    the reference alone shows what is missing in its model (`diagnose`; in other driving only if
+    something seems to have changed), or an effect that is in both the same explains more than the
+    change, the reference lacks it: it is put into its model, and the drivings are compared again
+    (`Change.lacks`). Both are taken as independent; noise is that of the reference. What a model
+    lacks acts otherwise at other speeds or lateral accelerations: as far as the later driving is
+    there (`Change.alike`), standard errors hold what estimates differ by between pieces of the
+    reference.
 
     Parameters
     ----------
@@ -117,18 +118,21 @@ def _compared(
 ) -> Change | Effect:
     """What changed, or what has to be put into the model of the reference first.
 
-    What the reference shows alone is asked for as soon as a single change is shown: beside a lack
-    the search goes far astray.
+    What the reference shows alone is asked for first: lines from where it is wrong hide a change
+    of what it lacks, and lead far astray beside others. In other driving what stands in for a lack
+    acts otherwise, which pieces of the reference tell as long as it is left out: there it is asked
+    for as soon as a single change is shown.
     """
-    shown = search.nothing(search.singles) <= 1.0 - search.rules.credible
-    if may_lack and shown:
+    like = search.alike.beyond <= search.rules.taken
+    first = like or search.nothing(search.singles) <= 1.0 - search.rules.credible
+    if may_lack and first:
         lack = _named_in(search.before, candidates, search.rules)
         if lack is not None:
             return lack
     said = Saying(search)
     change = said.change()
     lack = said.lack() if may_lack and not change.calm else None
-    if may_lack and not (change.calm or shown or lack):
+    if may_lack and not (change.calm or first or lack):
         lack = _named_in(search.before, candidates, search.rules)
     return change if lack is None else lack
 

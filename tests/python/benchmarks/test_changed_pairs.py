@@ -43,6 +43,7 @@ def test_the_driving_is_the_one_that_is_asked_for(program: SimpleNamespace, driv
 
 def row(truths: int, named: bool, wrong: int) -> dict[str, object]:
     told = {"first": named, "group": named, "least": named, "inside": named}
+    told |= {"weak": not named, "imitated": False}
     return {
         "kind": "mass" if truths else "nothing",
         "truths": [told] * truths,
@@ -58,5 +59,6 @@ def test_what_is_said_is_counted(program: SimpleNamespace) -> None:
     text = program.counts.table(rows)
     mass = next(line for line in text.splitlines() if line.split()[0] == "mass")
     assert mass.split()[1:] == ["3", "2", "2", "2", "2", "2/3", "1"]
+    assert "not named 1, told that one of usual size is too weak to see 1, that it is" in text
     assert "nothing changed: 2, claims 1," in text
     assert "pairs with a change 3, with a wrong name 1" in text

@@ -236,7 +236,7 @@ def test_of_what_is_not_measured_any_more_no_change_is_told(
     assert np.isfinite(found.std[1 - untold])
     assert found.said == "not testable"
     json.dumps(change.to_dict(), allow_nan=False)
-    assert "at a bound, or never felt" in str(found)
+    assert "not shown by this driving" in str(found)
 
 
 def test_a_fit_to_predictions_is_no_reference(before: Fit, course: Log) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from sysid_vehicle import Fit, Model, changed, drive, effect, identify, manoeuvres
 from sysid_vehicle.diagnose.change.may_change import of_effect
+from sysid_vehicle.diagnose.change.pieces import Alike, Pieces
 from sysid_vehicle.diagnose.change.reference import Exact, Reference
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
@@ -68,11 +69,11 @@ def test_what_the_reference_alone_shows_to_be_missing_is_put_in(truth: Model) ->
 
 
 @pytest.mark.filterwarnings("ignore:lap is of the reference")  # enough for what is asked here
-@pytest.mark.parametrize("nothing", [0.0, 0.5])
-def test_it_is_asked_for_before_the_search_where_something_changed(
-    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, nothing: float
+@pytest.mark.parametrize(("nothing", "beyond"), [(0.0, 0.0), (0.5, 0.0), (0.0, 1.0), (0.5, 1.0)])
+def test_it_is_asked_for_before_the_search(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, nothing: float, beyond: float
 ) -> None:
-    """Beside what is lacked the search goes astray, for many times as long."""
+    """Beside what is lacked the search goes astray; in other driving if something changed."""
     before = identify(start, drive(truth, manoeuvres.lap(10.0), seed=3, rate_hz=50.0), starts=1)
     module, asked = sys.modules[changed.__module__], []
 
@@ -86,14 +87,15 @@ def test_it_is_asked_for_before_the_search_where_something_changed(
             super().__init__(search)
 
     monkeypatch.setattr(Search, "nothing", lambda *_: nothing)
+    monkeypatch.setattr(Pieces, "alike", lambda *_: Alike(beyond, 0.0))
     monkeypatch.setattr(module, "_named_in", shows)
     monkeypatch.setattr(module, "Saying", Asked)
     change = changed(before, before.driving.logs[0], candidates=("steer_ratio",))
-    # Nothing changed in the same log: the search alone finds that, and nothing is asked.
     full = (DOWNFORCE,)
     told = [f"alone {()}", f"alone {full}", f"search {full}"]
-    assert asked == ([f"search {()}"] if nothing else told)
-    assert change.lacks == (() if nothing else full)
+    left = nothing > 0.0 and beyond > 0.0
+    assert asked == ([f"search {()}"] if left else told)
+    assert change.lacks == (() if left else full)
 
 
 @pytest.mark.filterwarnings("ignore:lap is of the reference")  # enough for what is asked here

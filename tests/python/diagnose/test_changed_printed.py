@@ -1,5 +1,6 @@
 """What is named, printed and kept of what changed: sizes, and what would have been seen."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,15 +9,51 @@ import pytest
 from changed_drives import OFFSET, inside, later
 from contradictions import contradictions_of_changes
 
-from sysid_vehicle import Change, Fit, Log, Model, changed, load
+from sysid_vehicle import (
+    Change,
+    Fit,
+    Log,
+    Model,
+    RoadDisturbance,
+    changed,
+    drive,
+    identify,
+    load,
+    manoeuvres,
+)
 from sysid_vehicle._common.text import number
+from sysid_vehicle.diagnose.change.changes_compete import Competition
+from sysid_vehicle.diagnose.change.saying import Saying
+from sysid_vehicle.diagnose.change.search import Search
+from sysid_vehicle.diagnose.changed import _later
 from sysid_vehicle.errors import SysidWarning
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.rules import USUAL
+
+MOVED = ("steer_ratio", "force_split", "aero_downforce")
 
 
 @pytest.fixture(scope="module")
 def none(fit: Fit, course: Log) -> Change:
     """Where nothing changed, though all of the catalogue may have."""
     return changed(fit, course)
+
+
+@pytest.fixture(scope="module")
+def sweep(truth: Model) -> Change:
+    """Two gentle sweeps at one speed, between which nothing changed, on a rough road."""
+    rough = RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
+    logs = [
+        drive(
+            truth,
+            manoeuvres.sine_sweep(20.0, lateral_mps2=4.0),
+            seed=seed,
+            rate_hz=50.0,
+            disturbance=rough,
+        )
+        for seed in (51, 52)
+    ]
+    return changed(identify(truth, logs[0], starts=1), logs[1], candidates=MOVED)
 
 
 def test_nothing_is_named_where_nothing_changed(none: Change) -> None:
@@ -143,6 +180,49 @@ def test_more_than_all_of_a_stiffness_is_printed_as_a_number(offset: Change) -> 
     text = str(replace(offset, effects=(offset.effects[0], tyre)))
     assert "cornering stiffness of the front axle below 152 %" in text
     assert "its cornering stiffness is seen to change from 152 % on" in text
+
+
+def test_an_error_beyond_all_that_a_parameter_may_be_is_told_in_words(
+    truth: Model, before: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a direction that the driving does not show it was 1e+135."""
+    log = later(truth)
+    search = Search(before, _later(before, Driving.of(log), None), ("steer_ratio",), USUAL)
+    said = Saying(search)
+    causes, (sizes, _) = said.change().causes, said._told_sizes([], said.state)
+    monkeypatch.setattr(Competition, "std_along", lambda *_: 1e135)
+    found = {}
+    for std in (1e-3, 1e135):
+        of = {n: std for m in search.may for n in m.names}
+        found[std] = {
+            m.id: said._of(m, causes, sizes, of, said.told, calm=True) for m in search.may
+        }
+    for effect in ("steer_ratio", "tyre_front"):
+        known, untold = found[1e-3][effect], found[1e135][effect]
+        assert np.isfinite(known.std).all()
+        assert set(untold.std) == {np.inf}
+        assert "not shown by this driving" in untold.size
+        assert "e+" not in f"{untold.size}{untold.sentence}{untold.to_dict()}"
+    assert "not shown" not in found[1e-3]["steer_ratio"].size
+    json.dumps(found[1e135]["tyre_front"].to_dict(), allow_nan=False)
+
+
+def test_which_driving_would_show_a_change_is_told(sweep: Change) -> None:
+    """At one speed a downforce is a stiffness of both axles; who does not brake tells no split."""
+    split, wing = sweep["force_split"], sweep["aero_downforce"]
+    assert split.weak
+    assert split.imitated_by == ()
+    assert split.sentence.endswith("excited by braking and full throttle in corners")
+    assert "of a usual size force_split" in str(sweep)
+    assert not wing.weak
+    assert wing.imitated_by[0] == "stiffness_both_axles"
+    assert sweep.to_dict()["effects"]["aero_downforce"]["imitated_by"] == [*wing.imitated_by]
+    text = replace(wing, said="not testable").sentence
+    assert "a usual change is confounded with stiffness_both_axles" in text
+    assert text.endswith("excited by the same lateral acceleration at three or more speeds")
+    assert "excited by" not in replace(wing, said="unchanged").sentence
+    assert not sweep["steer_ratio"].weak
+    assert "excited by" not in replace(sweep["steer_ratio"], said="not testable").sentence
 
 
 def test_a_change_prints_and_is_kept(offset: Change, tmp_path: Path) -> None:

@@ -85,4 +85,4 @@ def test_a_change_that_no_effect_explains_is_told_where_it_acts(before: Fit, tru
     values = {"aero_drag.drag_area_m2": 0.6, "steer_offset.offset_rad": 0.006}
     change = told(before, truth, values, ("steer_offset",))
     assert "steer_offset" in {e.id for e in change.named}
-    assert [s.effects for s in change.unknown] == [("unknown dv_x/dt",)]
+    assert [s.effects for s in change.unknown] == [("unknown F_x",)]

@@ -93,6 +93,22 @@ def test_tyres_that_did_not_change_have_errors_of_their_stiffness_too(
         assert (change[f"tyre_{axle}"].least_stiffness or np.inf) < 0.1
 
 
+def test_less_grip_is_told_where_both_drivings_were_fitted(truth: Model) -> None:
+    """Lines from the reference alone met it elsewhere in the valley: they dropped the friction."""
+    usual = truth.vehicle.replace(tyre_front=Tyre(), tyre_rear=Tyre())
+    less = truth.with_values({n: 0.8 * truth.value(n) for n in ("D_front", "D_rear")})
+    course = manoeuvres.lap(20.0, lateral_mps2=4.0)
+    log, later = (
+        drive(car, course, seed=seed, rate_hz=25.0).without("vy_mps")
+        for car, seed in ((truth, 31), (less, 32))
+    )
+    change = changed(identify(Model(usual), log, starts=1), later, candidates=("steer_ratio",))
+    assert {e.id for e in change.named} == {"friction_both_axles", "stiffness_both_axles"}
+    for e in change.named:
+        assert abs(e.value[0] + 0.2) < 2.0 * e.std[0]
+    assert change["stiffness_both_axles"].std[0] < 0.02
+
+
 def test_what_tyres_can_be_is_asked_of_their_stiffness(truth: Model, gentle: Fit) -> None:
     """A coefficient may go far along its valley, and no line tells how far it may."""
     said = gently_later(truth, gentle, 0.7)

@@ -71,7 +71,7 @@ struct CgPosition : Effect {
         .source =
             "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 5; Klein & Morelli, Aircraft "
             "System Identification, ch. 10",
-        .excited_by = "a ramp to the limit and a sweep; axle scales settle it",
+        .excited_by = "hard cornering, braking and drive on an even road; axle scales settle it",
         .moves = "yaw_rate_radps, vy_mps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
         .confounded_with =

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._common.printed import Part, Printed, Table
 from ..._common.tables import frame
-from ..._common.text import brief, number
+from ..._common.text import brief, few, number
 from ...identify import Fit
 from ...rules import Rules
 from ..candidates.causes import UNKNOWN, Causes, CredibleSet
@@ -135,8 +135,8 @@ class Change(Printed):
     _HEAD = ("what", "by how much", "how sure", "")
 
     def _rows(self, most: int = 8) -> list[list[str]]:
-        few = self.effects[: max(most, len(self.named))]
-        return [[e.id, e.size, e.sure.removesuffix(" sure") or "-", e.sentence] for e in few]
+        first = self.effects[: max(most, len(self.named))]
+        return [[e.id, e.size, e.sure.removesuffix(" sure") or "-", e.sentence] for e in first]
 
     __repr__ = brief
 
@@ -158,7 +158,7 @@ class Change(Printed):
         return [self._headline(), *told, self._power(), Table(self._HEAD, self._rows())]
 
     def _power(self) -> str:
-        """Which changes of the tyres this driving would not show."""
+        """Which changes of the tyres, and of usual size, this driving would not show."""
         known = {e.id: e for e in self.effects}
         sizes = {
             "cornering stiffness of the front axle": ("tyre_front", "least_stiffness"),
@@ -172,6 +172,8 @@ class Change(Printed):
                 least = np.atleast_1d(getattr(known[effect], of))[0]
                 below = f"below {number(100.0 * least, 2 if least < 1.0 else 3)} %"
                 told.append(f"{what} {below if np.isfinite(least) else 'of any size'}")
+        if weak := [e.id for e in self.effects if e.weak and not e.named]:
+            told.append(f"of a usual size {few(weak)}")
         return f"changes that would not be seen: {', '.join(told)}" if told else ""
 
     def to_pandas(self) -> Any:

@@ -17,6 +17,7 @@ from ..candidates.single_effects import Hypothesis, ScoreModel
 from ..evidence.projection import pseudo_inverse
 from ..unexplained.omnibus import LEAST_LEFT
 from .beside_reference import Differences
+from .imitated import left_by, likeness
 from .may_change import May, as_one
 
 _MOST = 6  # effects of the sum
@@ -80,7 +81,7 @@ class Competition:
         self._score = self._turns.T @ differences.score
         # One hypothesis of each name: the form with all parameters comes last.
         self._whole = {h.name: h for h in self._hypotheses}
-        self._alike = self._likeness()
+        self._alike = likeness(self._information, self._whole)
         self.sizes: dict[str, float] = {}
         self.stds: dict[str, float] = {}
         self.stds_beside: dict[str, float] = {}
@@ -127,23 +128,6 @@ class Competition:
             scale += [vague] * width
         return as_float64(np.column_stack(columns)), as_float64(scale)
 
-    def _likeness(self) -> dict[tuple[str, str], float]:
-        """Largest squared correlation between what two hypotheses can do."""
-        inverses = {
-            n: pseudo_inverse(self._information[np.ix_(h.columns, h.columns)])[0]
-            for n, h in self._whole.items()
-        }
-        found: dict[tuple[str, str], float] = {}
-        for a, one in self._whole.items():
-            for b, other in self._whole.items():
-                if (b, a) in found:
-                    found[a, b] = found[b, a]
-                    continue
-                cross = self._information[np.ix_(one.columns, other.columns)]
-                both = inverses[a] @ cross @ inverses[b] @ cross.T
-                found[a, b] = float(np.clip(np.linalg.eigvals(both).real.max(), 0.0, 1.0))
-        return found
-
     def acts_like(self, effect: str) -> str:
         """What was put in that the effect is, or acts like; empty where there is none."""
         if effect in self.put:
@@ -151,6 +135,20 @@ class Competition:
         near = {p: self._alike[effect, p] for p in self.put if effect in self._whole}
         best = max(near, key=lambda p: near[p], default="")
         return best if best and near[best] >= self._rules.near else ""
+
+    def hidden(self, effect: str, size: Sequence[float]) -> tuple[bool, tuple[str, ...]]:
+        """Whether a change gains too little to be named, and what by itself explains it as well."""
+        others = (h for n, h in self._whole.items() if n != effect and not n.startswith(UNKNOWN))
+        left = left_by(self._information, self._whole[effect], as_float64(size), others)
+        ratio, names = (
+            self.width_of((effect,)),
+            dict(zip(self._of(effect).names, size, strict=True)),
+        )
+        price = self.price((effect,), names)
+        told = {n: x / ratio for n, x in left.items()}
+        weak = told.pop(effect) < price + self._rules.told
+        few = sorted((n for n, x in told.items() if x < self._rules.told), key=lambda n: told[n])
+        return weak, () if weak else tuple(few)
 
     def _measured(self) -> FloatArray:
         """Sizes, and the variance ratio of each direction.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
-from ..._common.text import number, unit_after, with_error
+from ..._common.text import few, number, unit_after, with_error
 
 Said = Literal[
     "changed",
@@ -23,8 +22,10 @@ Said = Literal[
 _NAMED: tuple[Said, ...] = ("changed", "one of a group")
 
 
-def _signed(value: float, std: float) -> str:
-    told = with_error(value, std)
+def _signed(value: float, std: float, unit: str) -> str:
+    if not np.isfinite(std):
+        return "not shown by this driving"
+    told = with_error(value, std) + unit
     return told if told.startswith("-") else f"+{told}"
 
 
@@ -44,7 +45,8 @@ class EffectChange:
         Of its parameters.
     value, std : tuple of float
         Differences of its parameters and their standard errors, beside what else changed; of one of
-        a group that another one leads, in the place of that one.
+        a group that another one leads, in the place of that one. Infinite errors are larger than
+        all that a parameter may be: this driving does not show it.
     bound : tuple of float
         How far from nothing each difference may be, at 95 %.
     least : tuple of float
@@ -65,6 +67,14 @@ class EffectChange:
         differs, and its standard error: driving tells it long before B, C, D and E one by one.
     least_stiffness : float, optional
         Of tyres, what `least` is of parameters: the smallest such share that would be named.
+    weak : bool
+        Whether this driving tells too little of a change of usual size to name it, though nothing
+        else were known to do the same.
+    imitated_by : tuple of str
+        What explains a change of usual size as well in this driving, the best first; none of one
+        that is weak.
+    excited_by : str
+        Driving that shows it; empty where the catalogue tells none.
     """
 
     id: str
@@ -79,6 +89,9 @@ class EffectChange:
     least: tuple[float, ...] = ()
     stiffness: tuple[float, float] | None = None
     least_stiffness: float | None = None
+    weak: bool = False
+    imitated_by: tuple[str, ...] = ()
+    excited_by: str = ""
 
     @property
     def named(self) -> bool:
@@ -92,14 +105,14 @@ class EffectChange:
         Of tyres the stiffness, and those of B, C, D and E that are off nothing one by one: together
         they may be known where none of them is.
         """
-        told = [_signed(v, s) for v, s in zip(self.value, self.std, strict=True)]
+        figures = zip(self.value, self.std, map(unit_after, self.units), strict=True)
+        told = [f"{n} {_signed(*f)}" for n, f in zip(self.names, figures, strict=True)]
         if self.stiffness is None:
-            return self._listed(told)
+            return ", ".join(told)
         value, std = (100.0 * x for x in self.stiffness)
-        off = [b < 2.0 * abs(v) for v, b in zip(self.value, self.bound, strict=True)]
-        return ", ".join(
-            filter(None, (f"cornering stiffness {_signed(value, std)} %", self._listed(told, off)))
-        )
+        off = (b < 2.0 * abs(v) for v, b in zip(self.value, self.bound, strict=True))
+        seen = (t for t, shown in zip(told, off, strict=True) if shown)
+        return ", ".join((f"cornering stiffness {_signed(value, std, ' %')}", *seen))
 
     @property
     def sure(self) -> str:
@@ -119,8 +132,10 @@ class EffectChange:
             what = "likely, but not shown" if self.said == "likely" else self.said
             if self.stiffness is not None:
                 return f"{what}; {self.power}"
-            below = self._listed([f"below {number(b, 2)}" for b in self.bound])
-            return f"{what}: {below} at 95 %; {self.power}"
+            bounds = zip(self.names, self.bound, self.units, strict=True)
+            below = ", ".join(f"{n} below {number(b, 2)}{unit_after(u)}" for n, b, u in bounds)
+            hidden = self.hidden if self.said == "not testable" else ""
+            return "; ".join(filter(None, (f"{what}: {below} at 95 %", self.power, hidden)))
         return self.said
 
     @property
@@ -144,6 +159,15 @@ class EffectChange:
             return told
         return f"{told} by itself; it is larger, and not shown beside what else may have changed"
 
+    @property
+    def hidden(self) -> str:
+        """Why this driving does not name a change of usual size, and which would, in words."""
+        told = ""
+        if self.imitated_by:
+            told = f"a usual change is confounded with {few(self.imitated_by)}"
+        asked = f"excited by {self.excited_by}" if self.excited_by and (told or self.weak) else ""
+        return "; ".join(filter(None, (told, asked)))
+
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
         figures = (self.value, self.std, self.bound, self.least, self.units)
@@ -151,8 +175,11 @@ class EffectChange:
             "said": self.said,
             "probability": self.probability,
             "group": list(self.group),
-            "stiffness": None if self.stiffness is None else list(self.stiffness),
+            "stiffness": None if self.stiffness is None else [*map(_finite, self.stiffness)],
             "least_stiffness": _finite(self.least_stiffness),
+            "weak": self.weak,
+            "imitated_by": list(self.imitated_by),
+            "excited_by": self.excited_by,
             "change": {
                 n: {
                     "value": v,
@@ -164,10 +191,6 @@ class EffectChange:
                 for n, v, s, b, m, u in zip(self.names, *figures, strict=True)
             },
         }
-
-    def _listed(self, figures: Sequence[str], which: Sequence[bool] | None = None) -> str:
-        told = zip(self.names, figures, self.units, which or [True] * len(figures), strict=True)
-        return ", ".join(f"{n} {x}{unit_after(u)}" for n, x, u, shown in told if shown)
 
     def __str__(self) -> str:
         return f"{self.id}: {self.size}"

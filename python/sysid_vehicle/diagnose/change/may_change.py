@@ -40,6 +40,10 @@ class May:
         Which of them may change together.
     rivals : tuple of str
         What acts like it in most driving.
+    usually : tuple of float
+        A usual change, with the signs that its parameters have together.
+    excited_by : str
+        Driving that shows it; empty where the catalogue tells none.
     """
 
     id: str
@@ -47,6 +51,8 @@ class May:
     parameters: tuple[Parameter, ...]
     forms: tuple[tuple[int, ...], ...]
     rivals: tuple[str, ...] = ()
+    usually: tuple[float, ...] = ()
+    excited_by: str = ""
 
     @property
     def scale(self) -> tuple[float, ...]:
@@ -82,8 +88,10 @@ def change(name: str, before: float, after: float) -> float:
 
 def of_effect(e: Effect) -> May:
     """An effect of the catalogue or of a user."""
-    several = tuple(difference(p, abs(p.typical - p.null_value)) for p in e.parameters)
-    return May(e.id, tuple(e.named), several, tuple(forms(e)), e.confounded_with)
+    usually = tuple(p.typical - p.null_value for p in e.parameters)
+    several = tuple(difference(p, abs(u)) for p, u in zip(e.parameters, usually, strict=True))
+    known = e.confounded_with, usually, e.excited_by
+    return May(e.id, tuple(e.named), several, tuple(forms(e)), *known)
 
 
 def of_tyre(model: Model, axle: str) -> May:

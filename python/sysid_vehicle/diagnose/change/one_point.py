@@ -1,7 +1,8 @@
 """Both drivings linearised at one point: where what did not change was fitted to both.
 
 Coefficients of tyres lie in a bent valley. A line along it where the reference was fitted alone
-does not meet the one where both were: what lies between them would be called a change.
+does not meet the one where both were: what lies between them would be called a change, or would
+take the place of one.
 """
 
 from __future__ import annotations

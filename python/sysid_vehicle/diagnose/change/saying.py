@@ -25,6 +25,11 @@ def _within(least: float, most: float) -> float:
     return least if least <= most else np.inf
 
 
+def _shown(std: float, ends: tuple[float, float]) -> float:
+    """A standard error; infinite where it is larger than all that its parameter may be."""
+    return std if std < ends[1] - ends[0] else np.inf
+
+
 class Saying:
     """What is said of everything that may have changed."""
 
@@ -36,6 +41,8 @@ class Saying:
     @cached_property
     def at_one_point(self) -> Competition:
         """Of tyres that did not change: their coefficients lie in a bent valley."""
+        if self.state.put:
+            return self.told
         return self.search.told(self.state, at_one_point=True)
 
     def change(self) -> Change:
@@ -266,7 +273,9 @@ class Saying:
         cut = beyond(raw[0], [rules.bound * s for s in raw[1]], ends)
         told_by = [(1.0 - cut) * v for v in raw[0]]
         value = tuple(float(np.clip(v, *both)) for v, both in zip(told_by, ends, strict=True))
-        std = tuple(max(s, cut * abs(v)) for v, s in zip(*raw, strict=True))
+        std = tuple(
+            _shown(max(s, cut * abs(v)), both) for v, s, both in zip(*raw, ends, strict=True)
+        )
         bound = tuple(
             min(abs(v) + rules.bound * s, max(-low, high))
             for v, s, (low, high) in zip(value, std, ends, strict=True)
@@ -290,7 +299,8 @@ class Saying:
         sure = None if said in ("unchanged", "not testable") else causes.inclusion.get(m.id, 0.0)
         least_stiffness = None if stiffness is None else self._least_stiffness(m, stiffness[1])
         figures = (value, std, bound, sure, said, group, least, stiffness, least_stiffness)
-        return EffectChange(m.id, names, units, *figures)
+        hidden = told.hidden(m.id, m.usually) if m.usually else (False, ())
+        return EffectChange(m.id, names, units, *figures, *hidden, m.excited_by)
 
     @staticmethod
     def _verdict(
@@ -347,4 +357,5 @@ class Saying:
             known = told.beside(m.id)
             value = (1.0 - cut) * float(later @ [known[n] for n in m.names])
         std = told.std_along(m.id, (later, earlier), known)
-        return value, max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)
+        std = max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)
+        return value, _shown(std, (0.0, 1.0))  # an error of all of it tells nothing

@@ -291,7 +291,7 @@ class Search:
         return odds
 
     def told(self, state: Exact, *, at_one_point: bool = False) -> Competition:
-        """What competes beside what was put in."""
+        """What competes beside what was put in: lines are then drawn at one point of both."""
         reference, side = self.reference, self.reference.side
         multiplied = factors(state.searched)
         names, effects = reference.names, reference.effects
@@ -302,7 +302,7 @@ class Search:
             same = replace(self.before, model=without(state.searched))
             side = Side(same, names, effects, like=side, residuals_of=side)
             lines = replace(lines, side=side)
-        elif at_one_point:
+        elif state.put or at_one_point:
             lines = Lines.at_one_point(reference, state)
         differences = Differences(
             lines.side, later, lines.shift, lines.known, self._pieces, self.alike.unlike
