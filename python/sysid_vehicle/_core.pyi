@@ -4,6 +4,8 @@ from typing import Any, NoReturn, TypedDict, type_check_only
 import numpy as np
 import numpy.typing as npt
 
+from ._core_banded import banded_gram as banded_gram
+from ._core_banded import banded_squares as banded_squares
 from ._core_mu_slip import MagicFormulaCurve as MagicFormulaCurve
 from ._core_mu_slip import MagicFormulaFilter as MagicFormulaFilter
 from ._core_mu_slip import TwoParameterCurve as TwoParameterCurve
@@ -284,18 +286,6 @@ class LabLoop(metaclass=_Bound):
 
 def base_parameters() -> list[dict[str, Any]]: ...
 def effects() -> list[dict[str, Any]]: ...
-def banded_gram(
-    pointers: npt.NDArray[np.int32],
-    columns: npt.NDArray[np.int32],
-    values: _Array,
-    size: int,
-) -> _Array: ...
-def banded_squares(
-    factor: _Array,
-    pointers: npt.NDArray[np.int32],
-    columns: npt.NDArray[np.int32],
-    values: _Array,
-) -> _Array: ...
 def formula_parts() -> dict[str, Any]: ...
 def write_model(model: SingleTrack, parameters: _Array, v_x: float) -> WrittenModel: ...
 def simulate(

@@ -73,6 +73,7 @@ NUMERICAL = {
         "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",
     },
     "study/judge/slow.py": {"_AT_LONGEST"},
+    "study/search/search.py": {"_UNSEEN"},
     "study/search/steps.py": {"_ALTERNATIVES"},
     "study/judge/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
     "study/search/together.py": {"_LEAST", "_SUBSETS"},

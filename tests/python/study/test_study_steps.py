@@ -347,20 +347,20 @@ def test_two_that_may_hold_only_together_are_sought_together(
     assert first.id == "steer_lag"
     trail = Trail([baseline])
     looking = replace(search(test, 2, []), candidates=both)
-    found = looking._beside_another(alone, trail)
+    found = looking._beside_others(alone, trail)
     if downforce == 0.0:
         assert found is None
         return
     assert found is not None
-    assert found[0] is first
+    assert found[0] == tuple(both)
     assert found[1].model.effects == tuple(both)
     assert error_falls(baseline, found[1], test)
     assert "aero_downforce" in trail.p_values
-    assert replace(looking, most_effects=1)._beside_another(alone, trail) is None
+    assert replace(looking, most_effects=1)._beside_others(alone, trail) is None
     told: list[str] = []
     silent = replace(alone, ranking=tuple(replace(c, p_value=1.0) for c in alone.ranking))
     assert likeliest(silent) is None
-    assert replace(looking, say=told.append)._beside_another(silent, trail) is None
+    assert replace(looking, say=told.append)._beside_others(silent, trail) is None
 
 
 def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:

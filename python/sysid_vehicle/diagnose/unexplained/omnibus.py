@@ -13,8 +13,7 @@ and is taken off all other directions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -62,8 +61,6 @@ class Omnibus:
         Target that carries most of the evidence.
     rules : Rules
         By which it rejects.
-    alone : mapping
-        By target, the p-value of nothing acting on it.
     """
 
     statistic: float
@@ -71,18 +68,11 @@ class Omnibus:
     p_value: float
     strongest: str
     rules: Rules = USUAL
-    alone: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def rejects(self) -> bool:
         """Whether the model is shown to be incomplete, at 1 % usually."""
         return not self.p_value > self.rules.level
-
-    @property
-    def rejects_along(self) -> bool:
-        """Whether something is shown to be left of the motion along the car."""
-        along = [p for target, p in self.alone.items() if _MOVES[target] == _FORWARD]
-        return self.rejects and not len(along) * min(along, default=1.0) > self.rules.level
 
     @property
     def moves(self) -> tuple[str, ...]:
@@ -122,14 +112,12 @@ def _tested(unknown: Unknown, projected: Directions, rules: Rules) -> Omnibus:
     targets, values, ranks = unknown.tested(projected)
     ratios = np.maximum(projected.answer(unknown).ratios[: len(ranks)], 1.0)
     statistics = projected.score[projected.place(unknown)] @ values / ratios
-    p_values = scipy.stats.chi2.sf(statistics, ranks).tolist()
     return Omnibus(
         float(statistics[0]),
         ranks[0],
-        p_values[0],
+        float(scipy.stats.chi2.sf(statistics[0], ranks[0])),
         targets[int(np.argmax(statistics[1:]))],
         rules,
-        dict(zip(targets, p_values[1:], strict=True)),
     )
 
 

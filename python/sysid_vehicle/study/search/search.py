@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -19,7 +19,6 @@ from ...diagnose import (
     Size,
     beside_what_they_refine,
     diagnose,
-    omnibus,
     with_unfollowed,
 )
 from ...diagnose.diagnose import REFITS
@@ -40,6 +39,8 @@ from .steps import (
     likeliest,
 )
 from .together import InPlace, first_together, in_place_of
+
+_UNSEEN = 3  # effects that the training data alone lead to, before validation data confirm one more
 
 
 @dataclass(eq=False)
@@ -222,11 +223,14 @@ class Search:
                 trail.diagnoses[-1] = dx
                 if dx.ranking is not ranking:
                     step, several = self._that_hold(dx)
+            beside = None
             if step is None and several is None:
-                step = before(self.ends, partial(self._beside_another, dx, trail), None)
+                beside = before(self.ends, partial(self._beside_others, dx, trail), None)
             if several is not None:
                 chosen, lean = several
                 trail.note_several(dx, chosen, in_place_of(lean, chosen, dx, self.ends))
+            elif beside is not None:
+                chosen, lean = beside
             elif step is not None:
                 chosen, lean = (step[0].id,), step[1]
                 trail.note(dx, step[0])
@@ -315,32 +319,29 @@ class Search:
         except (NumericalError, np.linalg.LinAlgError):
             return None
 
-    def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:
-        """The likeliest candidate, where it holds only together with one that is missing too.
+    def _beside_others(self, dx: Diagnosis, trail: Trail) -> tuple[tuple[str, ...], Fit] | None:
+        """The likeliest candidates one after the other, where they hold only together.
 
-        What the other one does to the validation data may be larger than what the first explains.
-        As neither has been seen to hold, they count only where together they leave nothing: two
-        that move the car along it alone, nothing of that motion, of which lateral errors say
-        nothing.
+        What else is missing may do more to the validation data than an effect explains. So the
+        training data alone lead on, until validation data confirm the whole.
         """
-        first = likeliest(dx)
-        if first is None or first.fit is None:
-            return None
-        if len(first.fit.model.effects) >= self.most_effects:
-            return None
-        beside = self._diagnosis(first.fit, trail.refitted)
-        tried = [beside]
-        if first.effect.along_alone:
-            along = tuple(c for c in beside.ranking if c.effect.along_alone)
-            tried.append(replace(beside, ranking=along))
-        for some in tried:
-            step = first_that_holds(some, trail.fit, self.test, self.ends)
-            if step is None or first.id not in step[1].model.effects:
+        noted: list[tuple[Diagnosis, Candidate]] = []
+        while len(noted) < _UNSEEN:
+            first = likeliest(dx)
+            if first is None or first.fit is None:
+                return None
+            if len(first.fit.model.effects) >= self.most_effects:
+                return None
+            noted.append((dx, first))
+            dx = self._diagnosis(beside_noise(first.fit), trail.refitted)
+            step = first_that_holds(dx, trail.fit, self.test, self.ends)
+            if step is None:
                 continue
-            left = omnibus(step[1], step[1].driving, self.rules)
-            if not (left.rejects_along if some is not beside else left.rejects):
-                trail.note(beside, step[0])
-                return first, step[1]
+            last, lean = step
+            for at, c in (*noted, (dx, last)):
+                trail.note(at, c)
+            new = (e for e in lean.model.effects if e not in trail.fit.model.effects)
+            return tuple(new), lean
         return None
 
     def _diagnosis(self, fit: Fit, again: Sequence[str], refits: int = REFITS) -> Diagnosis:

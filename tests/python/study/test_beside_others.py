@@ -1,0 +1,60 @@
+"""Effects of which none holds alone."""
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study.search.search import Search, Trail
+from sysid_vehicle.study.search.steps import likeliest
+
+BOTH = ("aero_drag", "steer_lag")
+
+
+@pytest.fixture(scope="module")
+def baseline(truth: Model, start: Model) -> Fit:
+    values = {"aero_drag.drag_area_m2": 0.6, "steer_lag.time_constant_s": 0.08}
+    car = truth.add(*BOTH).with_values(values)
+    return identify(start, drive(car, manoeuvres.lap(20.0), seed=61, rate_hz=50.0), starts=1)
+
+
+@pytest.mark.parametrize("confirmed_after", [1, 2, None])
+def test_training_data_lead_on_until_validation_data_confirm_the_whole(
+    baseline: Fit, monkeypatch: pytest.MonkeyPatch, confirmed_after: int | None
+) -> None:
+    asked: list[tuple[str, ...]] = []
+
+    def diagnosis(_: Search, fit: Fit, *__: object) -> Diagnosis:
+        asked.append(fit.model.effects)
+        left = [e for e in BOTH if e not in fit.model.effects]
+        return diagnose(fit, candidates=left or ["head_wind"])
+
+    def holds(dx: Diagnosis, of: Fit, *_: object) -> object:
+        assert of is baseline  # whatever was added, validation data are asked for all of it
+        last = likeliest(dx) or dx.ranking[0]
+        return (last, last.fit or dx.fit) if len(asked) == confirmed_after else None
+
+    monkeypatch.setattr(Search, "_diagnosis", diagnosis)
+    monkeypatch.setattr("sysid_vehicle.study.search.search.first_that_holds", holds)
+    looking = Search(
+        baseline.driving,
+        candidates=BOTH,
+        most_effects=4,
+        ends=np.inf,
+        rules=USUAL,
+        seed=0,
+        progress=False,
+        say=lambda _: None,
+    )
+    trail = Trail([baseline])
+    found = looking._beside_others(diagnose(baseline, candidates=BOTH), trail)
+    assert set(asked[0]) < set(BOTH)
+    if confirmed_after is None:
+        assert found is None
+        assert not trail.p_values
+        return
+    assert found is not None
+    names, fit = found
+    assert set(names) == set(fit.model.effects) == set(BOTH)
+    assert len(asked) == confirmed_after
+    assert trail.p_values.keys() >= set(BOTH)
