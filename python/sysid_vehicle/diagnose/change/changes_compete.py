@@ -140,12 +140,9 @@ class Competition:
         """Whether a change gains too little to be named, and what by itself explains it as well."""
         others = (h for n, h in self._whole.items() if n != effect and not n.startswith(UNKNOWN))
         left = left_by(self._information, self._whole[effect], as_float64(size), others)
-        ratio, names = (
-            self.width_of((effect,)),
-            dict(zip(self._of(effect).names, size, strict=True)),
-        )
-        price = self.price((effect,), names)
-        told = {n: x / ratio for n, x in left.items()}
+        named = dict(zip(self._of(effect).names, size, strict=True))
+        price = self.price((effect,), named)
+        told = {n: x / self.width_of((effect,)) for n, x in left.items()}
         weak = told.pop(effect) < price + self._rules.told
         few = sorted((n for n, x in told.items() if x < self._rules.told), key=lambda n: told[n])
         return weak, () if weak else tuple(few)
