@@ -24,7 +24,7 @@ def test_training_data_lead_on_until_validation_data_confirm_the_whole(
 ) -> None:
     asked: list[tuple[str, ...]] = []
 
-    def diagnosis(_: Search, fit: Fit, *__: object) -> Diagnosis:
+    def diagnosis(_: Search, fit: Fit, *__: object, **___: object) -> Diagnosis:
         asked.append(fit.model.effects)
         left = [e for e in BOTH if e not in fit.model.effects]
         return diagnose(fit, candidates=left or ["head_wind"])

@@ -38,7 +38,7 @@ from .steps import (
     lead,
     likeliest,
 )
-from .together import InPlace, first_together, in_place_of
+from .together import InPlace, first_together, in_place_of, with_foremost
 
 _UNSEEN = 3  # effects that the training data alone lead to, before validation data confirm one more
 
@@ -332,14 +332,18 @@ class Search:
                 return None
             if len(first.fit.model.effects) >= self.most_effects:
                 return None
-            noted.append((dx, first))
-            dx = self._diagnosis(beside_noise(first.fit), trail.refitted)
+            at, fit = dx, beside_noise(first.fit)
+            if noted:  # most searches come to nothing: from the third on one is refitted
+                dx = with_foremost(self._diagnosis(fit, (), refits=0))
+            else:
+                dx = self._diagnosis(fit, trail.refitted)
+            noted.append((at, first))
             step = first_that_holds(dx, trail.fit, self.test, self.ends)
             if step is None:
                 continue
             last, lean = step
-            for at, c in (*noted, (dx, last)):
-                trail.note(at, c)
+            for seen, c in (*noted, (dx, last)):
+                trail.note(seen, c)
             new = (e for e in lean.model.effects if e not in trail.fit.model.effects)
             return tuple(new), lean
         return None
