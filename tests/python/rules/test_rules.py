@@ -76,7 +76,7 @@ NUMERICAL = {
     "study/search/search.py": {"_UNSEEN"},
     "study/search/steps.py": {"_ALTERNATIVES"},
     "study/judge/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
-    "study/search/together.py": {"_FOREMOST", "_LEAST", "_SUBSETS"},
+    "study/search/together.py": {"_LEAST", "_SUBSETS"},
     # Descriptions of the unknown, of biases, and of the next drive.
     "diagnose/unexplained/ceiling.py": {
         "_RATE_HZ", "_LAGS_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",

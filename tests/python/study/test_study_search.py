@@ -10,7 +10,7 @@ from sysid_vehicle import Diagnosis, Effect, Fit, diagnose
 from sysid_vehicle.diagnose import refining
 from sysid_vehicle.identify import refit
 from sysid_vehicle.rules import UNKNOWN, USUAL, Share
-from sysid_vehicle.study.judge.judge import _warnings
+from sysid_vehicle.study.judge.cautions import cautions
 from sysid_vehicle.study.search.search import Search, Trail
 
 AGAINST = ["aero_drag", "rolling_resistance", "head_wind"]
@@ -128,7 +128,7 @@ def test_an_effect_with_which_errors_are_larger_where_it_acts_is_taken_out(
     assert trail.fit.model.effects == ("aero_drag",)
     assert trail.diagnoses[-1].fit is trail.fit
     assert trail.harmful == ("head_wind",)
-    (said,) = (text for text in _warnings(trail, (), baseline.driving) if "removed again" in text)
+    (said,) = (text for text in cautions(trail, (), baseline.driving) if "removed again" in text)
     assert said.startswith("head_wind removed again: where such an effect acts, errors 1 to 5 s")
     # Where nothing is left shares are noise.
     complete = replace(dx, omnibus=replace(dx.omnibus, p_value=0.5))

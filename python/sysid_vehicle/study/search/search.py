@@ -34,11 +34,12 @@ from .steps import (
     alternatives,
     exchanged,
     first_that_holds,
+    foretold_better,
     in_common,
     lead,
     likeliest,
 )
-from .together import InPlace, first_together, in_place_of, with_foremost
+from .together import InPlace, first_together, in_place_of
 
 _UNSEEN = 3  # effects that the training data alone lead to, before validation data confirm one more
 
@@ -323,7 +324,8 @@ class Search:
         """The likeliest candidates one after the other, where they hold only together.
 
         What else is missing may do more to the validation data than an effect explains. So the
-        training data alone lead on, until validation data confirm the whole.
+        training data alone lead on, until validation data confirm the whole; beyond two only while
+        these are predicted better one step ahead.
         """
         noted: list[tuple[Diagnosis, Candidate]] = []
         while len(noted) < _UNSEEN:
@@ -332,18 +334,16 @@ class Search:
                 return None
             if len(first.fit.model.effects) >= self.most_effects:
                 return None
-            at, fit = dx, beside_noise(first.fit)
-            if noted:  # most searches come to nothing: from the third on one is refitted
-                dx = with_foremost(self._diagnosis(fit, (), refits=0))
-            else:
-                dx = self._diagnosis(fit, trail.refitted)
-            noted.append((at, first))
+            if noted and not foretold_better(trail.fit, first.fit, self.test, self.rules):
+                return None
+            noted.append((dx, first))
+            dx = self._diagnosis(beside_noise(first.fit), trail.refitted)
             step = first_that_holds(dx, trail.fit, self.test, self.ends)
             if step is None:
                 continue
             last, lean = step
-            for seen, c in (*noted, (dx, last)):
-                trail.note(seen, c)
+            for at, c in (*noted, (dx, last)):
+                trail.note(at, c)
             new = (e for e in lean.model.effects if e not in trail.fit.model.effects)
             return tuple(new), lean
         return None

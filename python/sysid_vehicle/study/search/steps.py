@@ -51,12 +51,12 @@ def first_that_holds(
     answered at `judged_by`.
     """
     rules = dx.rules
-    likely = sorted(dx.significant, key=lambda c: not _can_be(c, rules))
+    likely = sorted(dx.significant, key=lambda c: not c.can_be(rules))
     first: Candidate | None = None
     holding: dict[str, tuple[float, Candidate, Fit]] = {}
     for c in likely:
         if first and (
-            c.id not in first.indistinguishable_from or _can_be(c, rules) != _can_be(first, rules)
+            c.id not in first.indistinguishable_from or c.can_be(rules) != first.can_be(rules)
         ):
             continue
         c = before(ends, partial(_at_its_maximum, dx, c), c)
@@ -64,7 +64,7 @@ def first_that_holds(
             continue
         # Validation data come first: what they do not confirm need not be made simpler.
         found = before(
-            judged_by, partial(speaks_for, fit, c.fit, _can_be(c, rules), test, rules), None
+            judged_by, partial(speaks_for, fit, c.fit, c.can_be(rules), test, rules), None
         )
         lean: Fit | None = c.fit
         if found is not None and insignificant(c.fit, rules):
@@ -90,7 +90,7 @@ def _at_its_maximum(dx: Diagnosis, c: Candidate) -> Candidate:
 
 def likeliest(dx: Diagnosis) -> Candidate | None:
     """The candidate that fits best, of those with evidence for them and a value a car can have."""
-    return next((c for c in dx.significant if _sound(c, dx.rules) and _can_be(c, dx.rules)), None)
+    return next((c for c in dx.significant if _sound(c, dx.rules) and c.can_be(dx.rules)), None)
 
 
 def _sound(c: Candidate, rules: Rules) -> bool:
@@ -126,8 +126,9 @@ def speaks_for(
     return measures if accept(measures, rules) else None
 
 
-def _can_be(c: Candidate, rules: Rules) -> bool:
-    return c.can_be(rules)
+def foretold_better(fit: Fit, found: Fit, test: Driving, rules: Rules) -> bool:
+    """Whether validation data speak for a richer model, whatever errors some seconds ahead do."""
+    return accept(_measures(fit, found, True, test), rules)
 
 
 def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from ..._common.threads import before, in_parallel
 from ...diagnose import Candidate, Diagnosis, Size
 from ...diagnose.candidates.possible import possible_in
-from ...diagnose.candidates.refits import finished, refitted
+from ...diagnose.candidates.refits import refitted
 from ...diagnose.candidates.reservation import beside
 from ...effects import Effect
 from ...errors import NumericalError
@@ -24,7 +24,6 @@ from ..ahead.own_share import without
 from .steps import better, merit, real, speaks_for, strength, without_insignificant
 
 _SUBSETS = 2  # that are refitted
-_FOREMOST = 3  # by score, of which the best is refitted to its end
 _LEAST = 1.0  # standard errors from nothing, below which the refit of a subset does not go on
 
 
@@ -181,17 +180,6 @@ def _undone_sideways(
                 best = replace(c, statistic=gained, value=value, std=std, fit=both)
                 more = len(e.parameters)
     return best, more
-
-
-def with_foremost(dx: Diagnosis) -> Diagnosis:
-    """Refit the likeliest of those with the highest scores, with noise of its own."""
-    fit = dx.fit
-    told = in_parallel(partial(refitted, fit, fit.driving), dx.significant[:_FOREMOST])
-    if not told:
-        return dx
-    best = max(told, key=lambda c: c.statistic)
-    others = (c for c in dx.ranking if c.id != best.id)
-    return replace(dx, ranking=(finished(fit, best), *others))
 
 
 def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
