@@ -167,8 +167,8 @@ def _taken_back(
         withdrawn, groups = without_share(facts, left, rules)
     if facts.unopposed:
         withdrawn.append(Withdrawn(names, _UNOPPOSED, names))
-    # Where one effect does as much as several that leave something, each may be a part of it.
-    if (left or stand_ins) and facts.one_for_all:
+    # Where one effect does as much as several, each may be a part of it.
+    if facts.one_for_all:
         because = f"{facts.one_for_all}, which was not sought, explains as much in place of all"
         withdrawn.append(Withdrawn(names, because, names))
     # What only stands in for something else explains nothing, however well it fits, and what cannot

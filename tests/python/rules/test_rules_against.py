@@ -40,17 +40,13 @@ def test_what_kinematics_tells_is_no_question_of_errors_ahead() -> None:
     assert standing(backed, verdict(backed)) == {"mass", "imu_lever_arm"}
 
 
-def test_several_names_that_leave_something_fall_where_one_effect_does_as_much() -> None:
+def test_several_names_fall_where_one_effect_does_as_much() -> None:
     beside = Added("aero_downforce", "missing", (), MASS.moves, MOST, MOST)
-    both = replace(LEFT, added=(MASS, beside), one_for_all="steer_offset")
-    found = verdict(both)
-    assert found.verdict == "unknown"
-    because = {e: w.because for w in found.withdrawn for e in w.effects}
-    assert because.keys() == {"mass", "aero_downforce"}
-    assert all("steer_offset, which was not sought" in text for text in because.values())
-    # Where nothing is left both explain all, and what is known of the car decides.
-    whole = replace(both, fitted=NONE)
-    assert verdict(whole).verdict == "explained"
-    proxy = replace(beside, finding="proxy", moves=frozenset({"vx_mps"}))
-    assert verdict(replace(whole, added=(MASS, proxy))).verdict == "unknown"
-    assert verdict(replace(whole, added=(MASS, proxy), one_for_all="")).verdict != "unknown"
+    both = replace(LEFT, added=(MASS, beside))
+    for facts, without in ((both, "partly_explained"), (replace(both, fitted=NONE), "explained")):
+        assert verdict(facts).verdict == without
+        found = verdict(replace(facts, one_for_all="steer_offset"))
+        assert found.verdict == "unknown"
+        because = {e: w.because for w in found.withdrawn for e in w.effects}
+        assert because.keys() == {"mass", "aero_downforce"}
+        assert all("steer_offset, which was not sought" in text for text in because.values())

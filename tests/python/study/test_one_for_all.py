@@ -75,6 +75,7 @@ def test_a_study_warns_of_it(heavy: Fit, lap: Log, truth: Model) -> None:
             sensors=False,
         )
     assert [a.id for a in found.added] == ["force_gain", "aero_drag"]
+    assert found.verdict == "unknown"
     said = found.warnings[0]
     assert "check mass_kg" in said
     assert said in {str(warning.message) for warning in caught}

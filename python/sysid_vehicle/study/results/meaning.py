@@ -53,7 +53,7 @@ def _unknown(study: Study) -> str:
             )
         return (
             f"something is missing; {' and '.join(names)} together explain {taken} of the error 1 "
-            "to 5 s ahead; this driving does not show which of them the car has"
+            "to 5 s ahead; this driving does not show which of them, if any, the car has"
         )
     if not names and only_elsewhere(study):
         return f"something is missing that shows in the validation data; it {in_training(study)}"
