@@ -18,10 +18,13 @@ def baseline(truth: Model, start: Model) -> Fit:
     return identify(start, drive(car, manoeuvres.lap(20.0), seed=61, rate_hz=50.0), starts=1)
 
 
-@pytest.mark.parametrize("confirmed_after", [1, 2, None])
+@pytest.mark.parametrize(
+    ("confirmed_after", "better"), [(1, True), (2, True), (2, False), (None, True)]
+)
 def test_training_data_lead_on_until_validation_data_confirm_the_whole(
-    baseline: Fit, monkeypatch: pytest.MonkeyPatch, confirmed_after: int | None
+    baseline: Fit, monkeypatch: pytest.MonkeyPatch, confirmed_after: int | None, better: bool
 ) -> None:
+    """Of two that are not even predicted better one step ahead no third one is sought."""
     asked: list[tuple[str, ...]] = []
 
     def diagnosis(_: Search, fit: Fit, *__: object, **___: object) -> Diagnosis:
@@ -36,6 +39,7 @@ def test_training_data_lead_on_until_validation_data_confirm_the_whole(
 
     monkeypatch.setattr(Search, "_diagnosis", diagnosis)
     monkeypatch.setattr("sysid_vehicle.study.search.search.first_that_holds", holds)
+    monkeypatch.setattr("sysid_vehicle.study.search.search.foretold_better", lambda *_: better)
     looking = Search(
         baseline.driving,
         candidates=BOTH,
@@ -49,8 +53,9 @@ def test_training_data_lead_on_until_validation_data_confirm_the_whole(
     trail = Trail([baseline])
     found = looking._beside_others(diagnose(baseline, candidates=BOTH), trail)
     assert set(asked[0]) < set(BOTH)
-    if confirmed_after is None:
+    if confirmed_after is None or not better:
         assert found is None
+        assert better or len(asked) == 1
         assert not trail.p_values
         return
     assert found is not None
