@@ -11,6 +11,9 @@ from .._common.threads import before, in_parallel
 
 R = TypeVar("R")
 
+TOGETHER = "whether several effects explain it that hold only together"
+"""What is open where the time limit ended the search for them."""
+
 # Of the time limit, when each stage ends: what one leaves goes to the next. They decide how far a
 # search comes, not what is claimed of what it found: that is asked of `Rules` alone.
 _SENSORS, _BASELINE, _SEARCHED, _STEP = 0.15, 0.4, 0.78, 0.85

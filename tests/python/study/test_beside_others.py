@@ -1,5 +1,8 @@
 """Effects of which none holds alone."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,6 +19,19 @@ def baseline(truth: Model, start: Model) -> Fit:
     values = {"aero_drag.drag_area_m2": 0.6, "steer_lag.time_constant_s": 0.08}
     car = truth.add(*BOTH).with_values(values)
     return identify(start, drive(car, manoeuvres.lap(20.0), seed=61, rate_hz=50.0), starts=1)
+
+
+def looking_for_both(fit: Fit) -> Search:
+    return Search(
+        fit.driving,
+        candidates=BOTH,
+        most_effects=4,
+        ends=np.inf,
+        rules=USUAL,
+        seed=0,
+        progress=False,
+        say=lambda _: None,
+    )
 
 
 @pytest.mark.parametrize(
@@ -40,16 +56,7 @@ def test_training_data_lead_on_until_validation_data_confirm_the_whole(
     monkeypatch.setattr(Search, "_diagnosis", diagnosis)
     monkeypatch.setattr("sysid_vehicle.study.search.search.first_that_holds", holds)
     monkeypatch.setattr("sysid_vehicle.study.search.search.foretold_better", lambda *_: better)
-    looking = Search(
-        baseline.driving,
-        candidates=BOTH,
-        most_effects=4,
-        ends=np.inf,
-        rules=USUAL,
-        seed=0,
-        progress=False,
-        say=lambda _: None,
-    )
+    looking = looking_for_both(baseline)
     trail = Trail([baseline])
     found = looking._beside_others(diagnose(baseline, candidates=BOTH), trail)
     assert set(asked[0]) < set(BOTH)
@@ -63,3 +70,31 @@ def test_training_data_lead_on_until_validation_data_confirm_the_whole(
     assert set(names) == set(fit.model.effects) == set(BOTH)
     assert len(asked) == confirmed_after
     assert trail.p_values.keys() >= set(BOTH)
+
+
+@pytest.mark.parametrize("late_in", ["first_that_holds", "_beside_others", None])
+def test_what_the_time_limit_left_untried_is_not_what_was_refused(
+    baseline: Fit, monkeypatch: pytest.MonkeyPatch, late_in: str | None
+) -> None:
+    """Effects that validation data refused in time are not said to be left untried."""
+    dx, now = diagnose(baseline, candidates=BOTH), [0.0]
+    assert all(c.fit is not None for c in dx.significant)
+
+    def refusing(name: str) -> Callable[..., None]:
+        def asked(*_: object) -> None:
+            now[0] += 2.0 * (name == late_in)
+
+        return asked
+
+    at = "sysid_vehicle.study.search.search."
+    monkeypatch.setattr("time.perf_counter", lambda: now[0])
+    monkeypatch.setattr(Search, "_diagnosis", lambda *_: dx)
+    monkeypatch.setattr(Search, "_beside_others", refusing("_beside_others"))
+    monkeypatch.setattr(f"{at}first_that_holds", refusing("first_that_holds"))
+    monkeypatch.setattr(f"{at}first_together", refusing("first_together"))
+    monkeypatch.setattr(f"{at}with_unfollowed", lambda found, _: found)
+    trail = Trail([baseline])
+    replace(looking_for_both(baseline), ends=1.0).follow(trail)
+    untried = {c.id for c in dx.significant} if late_in == "first_that_holds" else set()
+    assert set(trail.stopped) == untried
+    assert trail.unpaired is (late_in == "_beside_others")

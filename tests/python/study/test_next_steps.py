@@ -29,6 +29,7 @@ from sysid_vehicle.study.ahead.beyond import Beyond
 from sysid_vehicle.study.judge.disagree import disagreements
 from sysid_vehicle.study.judge.foretold import Foretold
 from sysid_vehicle.study.judge.structure import Structure
+from sysid_vehicle.study.limit import TOGETHER
 from sysid_vehicle.study.results.next_steps import next_steps
 from sysid_vehicle.study.results.sentences import ahead, in_the_end, small
 
@@ -133,6 +134,9 @@ def test_a_search_that_was_cut_short_is_to_go_on(unknown: Study) -> None:
     one = next_steps(replace(cut, stopped=("mass",)))
     assert one[0] == "raise the time limit: mass was not tried"
     assert not any("check the sensors" in text for text in said)
+    pairs = replace(cut, stopped=(), added=(), late_facts=(TOGETHER,))
+    assert next_steps(pairs)[0].startswith("raise the time limit: effects that hold only together")
+    assert "no single effect of the catalogue explains it, and the time limit" in pairs.meaning
 
 
 def test_only_what_the_driving_leaves_open_asks_for_harder_driving(unknown: Study) -> None:
@@ -371,6 +375,7 @@ def said(base: Study, rng: random.Random) -> str:
         matters=rng.choice((None, {"vy_mps": 0.1})),
         buried=facts.buried,
         stopped=("mass",) if rng.random() < 0.3 and min(candidates) < 0.01 else (),
+        late_facts=(TOGETHER,) if rng.random() < 0.2 and min(candidates) < 0.01 else (),
     )
     whole = rng.choice((-0.4, 0.02, 0.95, np.nan))
     study.__dict__.update(disagreements=(), predicting=base.predicting)

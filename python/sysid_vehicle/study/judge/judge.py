@@ -27,7 +27,7 @@ from ..ahead.own_share import (
     together_by_motion,
     without_idle,
 )
-from ..limit import Judging
+from ..limit import TOGETHER, Judging
 from ..results.added import added_by, of_one_step
 from ..results.widened import as_unsure, estimates_of
 from ..search.search import Trail
@@ -160,7 +160,7 @@ class Judge:
         fits, shared = (story, ()) if endless else self._way()
         on_train |= self._compared([f for f in fits if f not in on_train])
         on_test = self._compared(fits, self.test)
-        late = tuple(asks.left_out)
+        late = (*([TOGETHER] if self.trail.unpaired else []), *asks.left_out)
         wide = self._wide if decision.verdict in LACKING else None
         told = in_the_light_of(decision, alone)
         if wide is not None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..._common.text import few
 from ...rules import NONE_GONE
+from ..limit import TOGETHER
 from .sentences import (
     disturbance,
     elsewhere,
@@ -43,6 +44,11 @@ def _unknown(study: Study) -> str:
     taken, names = study.explained, [a.id for a in study.added]
     if study.stopped and (not names or taken is None):
         return "something is missing; the time limit ended the search for what explains it"
+    if TOGETHER in study.late_facts and not names:
+        return (
+            "something is missing; no single effect of the catalogue explains it, and the time "
+            "limit ended the search for several together"
+        )
     if names and taken is not None:
         if not taken.share > 0.0:
             return f"something is missing; the effects added are not confirmed: {NONE_GONE}"

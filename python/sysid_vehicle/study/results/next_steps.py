@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..._common.text import few
 from ...rules import LACKING
 from ..judge.matters import USUAL_SIZES
+from ..limit import TOGETHER
 from .sentences import disturbance, extrapolates, in_training, only_elsewhere, slow
 
 if TYPE_CHECKING:
@@ -161,6 +162,8 @@ def _of_the_search(study: Study) -> list[str]:
     if study.stopped:
         was = "was" if len(study.stopped) == 1 else "were"
         found.append(f"raise the time limit: {few(study.stopped)} {was} not tried")
+    elif TOGETHER in study.late_facts:
+        found.append("raise the time limit: effects that hold only together were not all tried")
     if study.verdict == "unknown" and study.small:
         usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
         found.append(

@@ -64,6 +64,8 @@ class Trail:
         Parameters of rivals and their standard errors, each refitted in place of what was chosen.
     stopped : tuple of str
         Effects with evidence that the time limit left untried.
+    unpaired : bool
+        Whether the time limit ended the search for effects that hold only together.
     full : tuple of str
         Effects with evidence that would have been one more than may be added.
     short : bool
@@ -81,6 +83,7 @@ class Trail:
     nearly: dict[str, tuple[Candidate, ...]] = field(default_factory=dict)
     sizes: dict[str, Size] = field(default_factory=dict)
     stopped: tuple[str, ...] = ()
+    unpaired: bool = False
     full: tuple[str, ...] = ()
     short: bool = False
     taken_back: tuple[str, ...] = ()
@@ -218,12 +221,14 @@ class Search:
                 trail.stopped = tuple(c.id for c in dx.significant)
                 return
             step, several = self._that_hold(dx)
+            judged = self._judged(dx)
             if step is None and several is None and dx.unfollowed:
                 # Where the best effect does not hold another may, however little it gains.
                 ranking, dx = dx.ranking, with_unfollowed(dx, self.ends)
                 trail.diagnoses[-1] = dx
                 if dx.ranking is not ranking:
                     step, several = self._that_hold(dx)
+                    judged |= self._judged(dx)
             beside = None
             if step is None and several is None:
                 beside = before(self.ends, partial(self._beside_others, dx, trail), None)
@@ -237,7 +242,8 @@ class Search:
                 trail.note(dx, step[0])
             else:
                 if time.perf_counter() > self.ends:
-                    trail.stopped = tuple(c.id for c in dx.significant)
+                    trail.stopped = tuple(c.id for c in dx.significant if c.id not in judged)
+                    trail.unpaired = bool(judged)
                 elif not self.most_effects:
                     trail.full = tuple(c.id for c in dx.significant)
                 return
@@ -272,6 +278,12 @@ class Search:
             step = first_that_holds(dx, dx.fit, self.test, *by)
         single = None if step is None else step[1]
         return step, first_together(dx, self.test, single, self.most_effects, *by)
+
+    def _judged(self, dx: Diagnosis) -> set[str]:
+        """Effects that validation data have answered for, where that was done in time."""
+        if time.perf_counter() > self.ends:
+            return set()
+        return {c.id for c in dx.significant if c.fit is not None}
 
     def take_out_harmful(self, trail: Trail) -> None:
         """Take effects out of the last model with which errors ahead are shown to be larger.
