@@ -22,7 +22,8 @@ from .asked import asked
 from .judge.judge import Judge
 from .limit import Judging, Schedule
 from .search.clock import in_time
-from .search.search import Search, Trail, kept
+from .search.search import Search
+from .search.trail import Trail, kept
 from .study import Study
 from .validation import set_aside
 
@@ -181,9 +182,7 @@ def improve(
                 progress=progress,
                 say=say,
             )
-            search.follow(found)
-            found.without_harm(test_driving, rules)
-            search.take_out_harmful(found)
+            search.settle(found)
             search.give_back(found)
         return found
 

@@ -8,8 +8,9 @@ import pytest
 
 from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.study.search.search import Search, Trail
+from sysid_vehicle.study.search.search import Search
 from sysid_vehicle.study.search.steps import likeliest
+from sysid_vehicle.study.search.trail import Trail
 
 BOTH = ("aero_drag", "steer_lag")
 

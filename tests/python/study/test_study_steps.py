@@ -11,7 +11,7 @@ from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
-from sysid_vehicle.study.search.search import Search, Trail, _step
+from sysid_vehicle.study.search.search import Search
 from sysid_vehicle.study.search.steps import (
     _distance,
     _mattering,
@@ -24,6 +24,7 @@ from sysid_vehicle.study.search.steps import (
     way,
     without_insignificant,
 )
+from sysid_vehicle.study.search.trail import Trail, step_in_words
 from sysid_vehicle.study.validation import (
     error_falls,
     fall_in_error,
@@ -365,12 +366,12 @@ def test_two_that_may_hold_only_together_are_sought_together(
 
 def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:
     fit = by_id(dx, "aero_drag")
-    assert _step(fit, ()).startswith("Added aero_drag: drag_area_m2 ")
-    assert _step(fit, ()).endswith(" m2.")
-    exchanged = _step(fit, ("head_wind", "mass"))
+    assert step_in_words(fit, ()).startswith("Added aero_drag: drag_area_m2 ")
+    assert step_in_words(fit, ()).endswith(" m2.")
+    exchanged = step_in_words(fit, ("head_wind", "mass"))
     assert exchanged.startswith("Added aero_drag: drag_area_m2 ")
     assert exchanged.endswith(" m2. Removed head_wind and mass.")
-    assert _step(fit, ("head_wind", "aero_drag")) == "Removed head_wind."
+    assert step_in_words(fit, ("head_wind", "aero_drag")) == "Removed head_wind."
 
 
 def test_the_fall_in_error_is_by_the_richer_models_floor(

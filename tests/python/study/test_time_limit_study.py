@@ -17,7 +17,8 @@ from sysid_vehicle.identify.identify import maximised
 from sysid_vehicle.sensors.kinematics import estimate as _estimate
 from sysid_vehicle.sensors.low_pass import low_pass as _low_pass
 from sysid_vehicle.study.judge import judge
-from sysid_vehicle.study.search.search import Search, Trail
+from sysid_vehicle.study.search.search import Search
+from sysid_vehicle.study.search.trail import Trail
 
 CANDIDATES = ["steer_lag", "aero_drag", "rolling_resistance", "yaw_inertia", "gyro_bias"]
 

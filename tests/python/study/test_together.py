@@ -15,7 +15,6 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study.search import together
-from sysid_vehicle.study.search.search import Trail
 from sysid_vehicle.study.search.together import (
     _from_within,
     _leading_subsets,
@@ -24,6 +23,7 @@ from sysid_vehicle.study.search.together import (
     first_together,
     in_place_of,
 )
+from sysid_vehicle.study.search.trail import Trail
 
 RATE_HZ = 50.0  # tells as much of these effects as 100 Hz, in half the time
 

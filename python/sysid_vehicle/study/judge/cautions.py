@@ -10,7 +10,7 @@ from ...estimate import Driving
 from ...identify import Estimate
 from ...rules import USUAL, Rules
 from ..results.next_steps import SHORT_S
-from ..search.search import Trail
+from ..search.trail import Trail
 from ..validation import twice
 
 
@@ -52,9 +52,10 @@ def cautions(
             f"{' and '.join(trail.harmful)} removed again: where such an effect acts, errors 1 to "
             "5 s ahead of validation data are larger with it, beside the others"
         )
-    if trail.taken_back:
+    taken_back = [e for e in dict.fromkeys(trail.taken_back) if e not in fit.model.effects]
+    if taken_back:
         found.append(
-            f"{' and '.join(trail.taken_back)} removed again: errors 1 to 5 s ahead fall with the "
+            f"{' and '.join(taken_back)} removed again: errors 1 to 5 s ahead fall with the "
             "parameters that predict best, but grow with those of the likelihood, whatever the "
             "driving leaves open"
         )

@@ -30,9 +30,9 @@ from ..ahead.own_share import (
 from ..limit import TOGETHER, Judging
 from ..results.added import added_by, of_one_step
 from ..results.widened import as_unsure, estimates_of
-from ..search.search import Trail
 from ..search.steps import insignificant, way
 from ..search.together import in_place_of
+from ..search.trail import Trail
 from ..study import Study
 from ..validation import at_its_best, beyond_noise_ahead, serving, together
 from .answers import answers_of

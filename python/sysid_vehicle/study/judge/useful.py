@@ -14,8 +14,8 @@ import numpy as np
 from ...estimate import Driving
 from ...identify import Fit
 from ...rules import USUAL, Rules
-from ..ahead.along_the_car import changes_of
 from ..ahead.beyond import Beyond
+from ..ahead.unmoved import changes_of
 from ..validation import AHEAD, fall_in_error
 
 NONE: frozenset[str] = frozenset()

@@ -15,7 +15,7 @@ from ...compare import Comparison
 from ...diagnose import Verdicts
 from ...identify import Estimate, Fit
 from ...rules import UNKNOWN, USUAL, Decision, Facts, Grade, Rules, Share, grade, little
-from ..search.search import Trail
+from ..search.trail import Trail
 
 _NOTHING: Mapping[str, str] = MappingProxyType({})
 

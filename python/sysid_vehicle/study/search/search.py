@@ -4,34 +4,29 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from ..._common.text import unit_after
-from ..._common.threads import before, in_parallel
+from ..._common.threads import before
 from ...diagnose import (
     Candidate,
     Diagnosis,
-    Size,
     beside_what_they_refine,
     diagnose,
     with_unfollowed,
 )
 from ...diagnose.diagnose import REFITS
 from ...effects import Effect
-from ...errors import Interrupted, NumericalError
+from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Fit, beside_noise, refine, with_own_offsets
-from ...rules import Rules, harmful, worse
-from ..ahead.along_the_car import changes_of
+from ...rules import Rules, harmful
 from ..ahead.own_share import own_shares
-from ..validation import AHEAD, serving
 from .steps import (
-    alternatives,
     exchanged,
     first_that_holds,
     foretold_better,
@@ -39,148 +34,10 @@ from .steps import (
     lead,
     likeliest,
 )
-from .together import InPlace, first_together, in_place_of
+from .together import first_together, in_place_of
+from .trail import Trail, step_in_words
 
 _UNSEEN = 3  # effects that the training data alone lead to, before validation data confirm one more
-
-
-@dataclass(eq=False)
-class Trail:
-    """How a model came about.
-
-    Attributes
-    ----------
-    fits : list of Fit
-        After each step; the first is the baseline.
-    diagnoses : list of Diagnosis
-        Before each step, and the last one, which found nothing more to add.
-    p_values : dict
-        By effect, when it was chosen or nearly chosen.
-    rivals : dict
-        By effect that was chosen or nearly chosen, what the driving could not tell from it.
-    nearly : dict
-        By effect, what was nearly chosen in its place.
-    sizes : dict
-        Parameters of rivals and their standard errors, each refitted in place of what was chosen.
-    stopped : tuple of str
-        Effects with evidence that the time limit left untried.
-    unpaired : bool
-        Whether the time limit ended the search for effects that hold only together.
-    full : tuple of str
-        Effects with evidence that would have been one more than may be added.
-    short : bool
-        Whether the length of the training data says how many these are, not the user.
-    taken_back : tuple of str
-        Effects of last steps without which the model predicts better (`without_harm`).
-    harmful : tuple of str
-        Effects taken out of the last model, as errors ahead are larger with them.
-    """
-
-    fits: list[Fit]
-    diagnoses: list[Diagnosis] = field(default_factory=list)
-    p_values: dict[str, float] = field(default_factory=dict)
-    rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    nearly: dict[str, tuple[Candidate, ...]] = field(default_factory=dict)
-    sizes: dict[str, Size] = field(default_factory=dict)
-    stopped: tuple[str, ...] = ()
-    unpaired: bool = False
-    full: tuple[str, ...] = ()
-    short: bool = False
-    taken_back: tuple[str, ...] = ()
-    harmful: tuple[str, ...] = ()
-
-    @property
-    def fit(self) -> Fit:
-        """Where it leads."""
-        return self.fits[-1]
-
-    @property
-    def refitted(self) -> tuple[str, ...]:
-        """Effects near the best of the last diagnosis, by refits with noise of their own."""
-        return tuple(c.id for dx in self.diagnoses[-1:] for c in dx.significant if c.finished)
-
-    @property
-    def confounded(self) -> dict[str, tuple[str, ...]]:
-        """By effect of the last model, its rivals that are not in the model beside it."""
-        there = self.fit.model.effects
-        found = {e: names for e, names in self.rivals.items() if e in there}
-        return {e: tuple(n for n in names if n not in there) for e, names in found.items()}
-
-    @property
-    def told(self) -> str:
-        """The effects so far with their sizes, in words."""
-        effects = [e for e in self.fit.model.effects if e not in self.fits[0].model.effects]
-        if not effects:
-            found = ", ".join(c.id for dx in self.diagnoses[:1] for c in dx.significant[:3])
-            return f"no effect was added yet; there is evidence for {found or 'none'}"
-        return "; ".join(f"{e}: {_sizes(self.fit, [e])}" for e in effects)
-
-    def without_harm(self, test: Driving, rules: Rules) -> None:
-        """Take back last steps while the model errs more ahead than the baseline, as it is fitted.
-
-        Each step was judged by the parameters that predict best: what they show an effect to take
-        away, those of the likelihood may lose where the effects that belong to it are not found.
-        What the fit left open does not speak against it: tyres that never met a slip angle take
-        any value, with an effect and without.
-        """
-        last = self.fit.model.effects
-
-        def harms() -> bool:
-            one, other = in_parallel(lambda fit: serving(fit, test), (self.fits[0], self.fit))
-            return bool(worse(changes_of(one, other, test, AHEAD), rules))
-
-        while len(self.fits) > 1 and harms():
-            self.fits.pop()
-            self.diagnoses.pop()
-        self.taken_back = tuple(e for e in last if e not in self.fit.model.effects)
-
-    def note_several(
-        self, dx: Diagnosis, chosen: Sequence[str], rivals: Mapping[str, InPlace]
-    ) -> None:
-        """Remember what was chosen together, and what is confounded with each of it.
-
-        So by the posterior, and as `in_place_of` finds.
-        """
-        self.sizes |= dx.sizes
-        for name in chosen:
-            self.p_values[name] = dx.family[name]
-            shared = dx.proposed.of(name)
-            others = () if shared is None else shared.effects
-            known = set(dx.family) - set(chosen)
-            in_place = rivals.get(name, InPlace())
-            alike = dict.fromkeys((*others, *in_place.names))
-            self.rivals[name] = tuple(e for e in alike if e in known)
-            self.sizes |= in_place.sizes
-
-    def note(self, dx: Diagnosis, chosen: Candidate) -> None:
-        """Remember what was chosen, and what nearly was."""
-        near = alternatives(dx, chosen)
-        self.nearly[chosen.id] = near
-        self.p_values |= {c.id: c.p_value for c in (chosen, *near)}
-        for c in near:
-            self.nearly.setdefault(c.id, alternatives(dx, c))
-            self.rivals.setdefault(c.id, c.indistinguishable_from)
-        self.rivals[chosen.id] = chosen.indistinguishable_from
-        self.sizes |= dx.sizes
-
-
-@contextmanager
-def kept(trail: Trail) -> Iterator[None]:
-    """Say after Ctrl-C in the block what is known by then.
-
-    Raises
-    ------
-    Interrupted
-    """
-    try:
-        yield
-    except KeyboardInterrupt as signal:
-        told = Interrupted(
-            f"after {len(trail.fits) - 1} step(s): {trail.told}. The models so far, the baseline "
-            "first, are the `fits` of this exception (sys.last_value.fits)"
-        )
-        told.fits = tuple(trail.fits)
-        raise told from signal
 
 
 @dataclass(frozen=True)
@@ -210,6 +67,22 @@ class Search:
     say: Callable[[str], None]
     judged_by: float = math.inf
     finer: Sequence[Effect] = ()
+
+    def settle(self, trail: Trail) -> None:
+        """Follow the way to its end, without what does harm there.
+
+        What was hidden by an effect that is taken out again is sought then: a lever arm of the
+        accelerometer may stand for a body that rolls, until a lean is beside it.
+        """
+        search = self
+        while True:
+            search.follow(trail)
+            trail.without_harm(self.test, self.rules)
+            if not self.take_out_harmful(trail) or time.perf_counter() > self.ends:
+                return
+            left = [c for c in self.candidates if getattr(c, "id", c) not in trail.harmful]
+            search = replace(self, candidates=left)
+            trail.diagnoses.pop()  # `follow` asks anew, with refits
 
     def follow(self, trail: Trail) -> None:
         """Add what is missing to the last model until nothing more is that the driving can show."""
@@ -264,7 +137,7 @@ class Search:
                 return
             known = set(trail.fit.model.effects)
             trail.fits.append(beside_noise(found))
-            self.say(_step(found, known))
+            self.say(step_in_words(found, known))
 
     def _that_hold(
         self, dx: Diagnosis
@@ -285,24 +158,25 @@ class Search:
             return set()
         return {c.id for c in dx.significant if c.fit is not None}
 
-    def take_out_harmful(self, trail: Trail) -> None:
+    def take_out_harmful(self, trail: Trail) -> bool:
         """Take effects out of the last model with which errors ahead are shown to be larger.
 
         Where they move something, on validation data, beside all others: when they came that may
         not have shown, and it hides what the others take. Where nothing is left shares are noise.
+        Says whether any was taken out.
         """
-        baseline = trail.fits[0].model.effects
+        baseline, before_it = trail.fits[0].model.effects, trail.harmful
         while len(trail.fits) > 1 and trail.diagnoses[-1].omnibus.rejects:
             fit = trail.fit
             added = [e for e in fit.model.effects if e not in baseline]
             own = own_shares(fit, added, added, self.test, self.judged_by, self.rules)
             worst = [(s.value, e) for e, (s, _) in own.items() if harmful(s, self.rules)]
             if not worst:
-                return
+                break
             name = min(worst)[1]
             poorer = before(self.judged_by, partial(self._without, fit, name), None)
             if poorer is None:
-                return
+                break
             trail.harmful += (name,)
             if len(added) > 1:
                 trail.fits.append(beside_noise(poorer))
@@ -310,6 +184,7 @@ class Search:
             else:
                 del trail.fits[1:], trail.diagnoses[1:]
             self.say(f"Removed {name}.")
+        return trail.harmful != before_it
 
     def give_back(self, trail: Trail) -> None:
         """Find anew what nuisances are in each log, with all effects of the last model beside them.
@@ -375,24 +250,3 @@ class Search:
             seed=self.seed,
             progress=self.progress,
         )
-
-
-def _step(found: Fit, known: Collection[str]) -> str:
-    """What a step put into the model, with sizes, and what it took out of it, in words.
-
-    A step may exchange what was there before, and drop what it began with itself.
-    """
-    new = [e for e in found.model.effects if e not in known]
-    gone = sorted(e for e in known if e not in found.model.effects)
-    said = [f"Added {' and '.join(new)}: {_sizes(found, new)}."] if new else []
-    said += [f"Removed {' and '.join(gone)}."] if gone else []
-    return " ".join(said)
-
-
-def _sizes(fit: Fit, effects: Sequence[str]) -> str:
-    """Parameters of effects with standard errors, in words."""
-    found = [e for e in fit.estimates if e.name.split(".")[0] in effects]
-    several = len(effects) > 1
-    return ", ".join(
-        f"{e.name if several else e.name.split('.')[1]} {e.size}{unit_after(e.unit)}" for e in found
-    )
