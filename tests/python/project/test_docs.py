@@ -1,6 +1,7 @@
 """What the documentation names exists: files, options of commands, public names."""
 
 import ast
+import builtins
 import importlib
 import re
 import shlex
@@ -54,6 +55,21 @@ def unknown_names(code: str) -> list[str]:
     return unknown
 
 
+def undefined(code: str) -> list[str]:
+    """Names that code reads and nothing in it makes."""
+    made, read = set(vars(builtins)), set()
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Name):
+            (read if isinstance(node.ctx, ast.Load) else made).add(node.id)
+        elif isinstance(node, ast.alias):
+            made.add((node.asname or node.name).partition(".")[0])
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            made.add(node.name)
+        elif isinstance(node, ast.arg):
+            made.add(node.arg)
+    return sorted(read - made)
+
+
 @pytest.mark.parametrize("path", PAGES, ids=name)
 def test_links_lead_to_files(path: Path) -> None:
     links = re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", path.read_text("utf-8"))
@@ -79,8 +95,14 @@ def test_python_blocks_use_what_exists(path: Path) -> None:
         assert unknown_names(block) == []
 
 
+@pytest.mark.parametrize("path", PAGES, ids=name)
+def test_python_blocks_of_a_page_run_one_after_the_other(path: Path) -> None:
+    assert undefined("".join(blocks(path, "python"))) == []
+
+
 def test_the_checks_see_what_is_missing() -> None:
     assert unknown_names("sv.Log\nsv.nothing()\nonline.KINDS") == ["sv.nothing"]
+    assert undefined("import a\nb = [c for c in a.d(e)]\nf = lambda g: print(g)") == ["e"]
     with pytest.raises(SystemExit):
         parse(["compare", "a.csv", "--vehicle", "car.toml", "--nothing"])
 
