@@ -28,6 +28,7 @@ Spoil = Callable[[np.ndarray, np.random.Generator], Any]
 
 def put(value: float) -> Spoil:
     def spoil(a: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        a = a.astype(np.float64)  # places of rows are whole numbers
         a.flat[rng.integers(0, max(a.size, 1), 3) % max(a.size, 1)] = value
         return a
 
@@ -158,6 +159,12 @@ def test_places_beyond_the_arrays_are_refused() -> None:
     law.channel = 2**64 - 1
     with pytest.raises(ValueError, match="laws: channel"):
         _core.ParameterLaws([law], 1e-3, 0, 20.0, [1.0, 1.0, 0.1])
+
+
+@pytest.mark.parametrize("size", [2**63, 2**64 - 1])
+def test_a_band_of_more_entries_than_can_be_counted_is_refused(size: int) -> None:
+    with pytest.raises(ValueError, match="size: expected columns that fit into memory"):
+        _core.banded_gram([0, 2], [0, 1], [1.0, 1.0], size)
 
 
 def test_a_log_that_is_none_is_refused(calls: dict[str, Call]) -> None:
