@@ -152,6 +152,22 @@ def test_answers_are_in_the_tree(question: str, answer: str) -> None:
     assert re.search(rf"\b{symbol}\b", (REPO / path).read_text("utf-8"))
 
 
+def test_every_figure_of_a_study_has_its_line() -> None:
+    source = (REPO / "python/sysid_vehicle/study/results/record.py").read_text("utf-8")
+    (whole,) = (
+        node.value
+        for part in ast.parse(source).body
+        if isinstance(part, ast.FunctionDef) and part.name == "record"
+        for node in part.body
+        if isinstance(node, ast.Return) and isinstance(node.value, ast.Dict)
+    )
+    keys = {ast.literal_eval(key) for key in whole.keys if key is not None}
+    text = (REPO / "docs/howto/improve.md").read_text("utf-8")
+    lines = text[text.index("| key | content |") :].splitlines()[2:]
+    told = {name for line in lines for name in re.findall(r"`(\w+)`", line.split("|")[1])}
+    assert told == keys
+
+
 def test_binder_brings_extras_that_exist() -> None:
     script = REPO / ".binder" / "postBuild"
     assert script.stat().st_mode & 0o100  # it is run as a program
