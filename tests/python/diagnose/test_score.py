@@ -203,7 +203,11 @@ def test_directions_are_free_of_what_the_fit_can_do(fit: Fit) -> None:
     for name, R in b.directions.items():
         cosine = (G.T @ R) / np.outer(np.linalg.norm(G, axis=0), np.linalg.norm(R, axis=0))
         assert np.abs(cosine).max() < 1e-3, name
-    assert all(0.0 < s.retained <= 1.0 + 1e-9 for s in b.scores)
+    raw = sensitivities(Evidence(fit, fit.driving), tuple(s.effect for s in b.scores))
+    for s in b.scores:
+        left, whole = b.directions[s.effect.id], raw.columns[:, raw.places[s.effect.id]]
+        assert s.retained == pytest.approx(np.linalg.norm(left) / np.linalg.norm(whole), rel=1e-6)
+        assert s.retained <= 1.0 + 1e-9
 
 
 def test_an_effect_the_log_cannot_show_has_no_score(
