@@ -383,6 +383,13 @@ def test_loads_bring_their_products_of_inertia() -> None:
             expected[name] += m.mass_kg * product
     for name, value in expected.items():
         assert getattr(load, name) == pytest.approx(value)
+    # As a tensor, whose products have the other sign.
+    tensor = NOMINAL_SUV.inertia()
+    for m in (*parts, *people):
+        off = np.array([m.x_m, m.y_m, m.z_m]) - centre
+        tensor = tensor + m.mass_kg * (off @ off * np.eye(3) - np.outer(off, off))
+    np.testing.assert_allclose(load.inertia(), tensor, rtol=1e-9)
+    assert tensor[0, 2] == pytest.approx(-load.jxz_kgm2)
     # The loaded car of table 3: as if all that was added sat at one place.
     added = LOADED_SUV.mass_kg - NOMINAL_SUV.mass_kg
     place = [
