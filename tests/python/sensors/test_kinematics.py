@@ -69,6 +69,22 @@ def test_derivatives_agree_with_differences(channel: str, sizes: str) -> None:
     assert own - moved <= {f"lean.{channel}"}
 
 
+def test_speeds_are_those_of_the_motion_but_for_gain_bias_and_slip() -> None:
+    x, none = motion(), dict.fromkeys(FAULTS, 0.0)
+    for channel in CHANNELS[:3]:
+        log = readings(channel)
+        plain = expected_of(log, GRID, x, none)
+        quick = GRID.quick(log.stretch, log.time_s)
+        signal = {"vx_mps": "vx", "vy_mps": "vy", "yaw_rate_radps": "yaw"}[channel]
+        value = np.sum(x[GRID.columns(signal, quick)] * quick.weights[0], axis=1)
+        np.testing.assert_allclose(plain, value, rtol=1e-12)
+        slipped = 1.0 if log.slips is None else 1.0 + log.slips @ [0.02, 0.03]
+        given = dict(zip(SLIPS, (0.02, 0.03), strict=True))
+        given |= {f"gain.{channel}": 0.05, f"bias.{channel}": 0.4}
+        found = expected_of(log, GRID, x, none | given)
+        np.testing.assert_allclose(found, 1.05 * slipped * value + 0.4, rtol=1e-12)
+
+
 def test_accelerometers_feel_the_motion_of_their_place() -> None:
     """Of a car on a circle that speeds up, on a level road, by the path of the place in space."""
     grid = Grid([Stretch(0, 0.0, 4.0)], step_s=0.05)
