@@ -167,6 +167,16 @@ def test_a_band_of_more_entries_than_can_be_counted_is_refused(size: int) -> Non
         _core.banded_gram([0, 2], [0, 1], [1.0, 1.0], size)
 
 
+def test_settings_of_a_loop_that_mean_nothing_are_refused() -> None:
+    loop = _core.LabLoop()
+    for steps in (-1, 1001, 2**31 - 1):  # the last would take hours
+        with pytest.raises(ValueError, match="steps: expected 0 to 1000"):
+            loop.set_plant(1.0, False, False, steps, 0.0, 9.81)
+    for way in (-1, 3):
+        with pytest.raises(ValueError, match="steer_by: there is no such way to steer"):
+            loop.steer_by = way
+
+
 def test_a_log_that_is_none_is_refused(calls: dict[str, Call]) -> None:
     learn, arguments = calls["learn_observer_noise"]
     with pytest.raises(ValueError, match="logs: expected no None"):
