@@ -25,9 +25,7 @@ void register_banded(py::module_& m) {
     m.def(
         "banded_gram",
         [](const Places& pointers, const Places& columns, const Array& values, std::size_t size) {
-            const SparseRows rows{span_of(pointers),
-                                  span_of(columns),
-                                  {values.data(), static_cast<std::size_t>(values.size())}};
+            const SparseRows rows = rows_of(pointers, columns, values);
             const LowerBand band = unlocked([&] { return gram(rows, size); });
             return copy_of(band.entries, band.width + 1);
         },

@@ -8,6 +8,8 @@ namespace sysid::bindings {
 
 namespace {
 
+constexpr int kMostSteps = 1000;  // of Runge-Kutta in a sample
+
 /// Everything but the references, the noise and the model.
 struct LabLoop {
     lab::LoopData loop;
@@ -126,7 +128,11 @@ void register_lab_loop(py::module_& m) {
             py::arg("form"))
         .def_property(
             "steer_by", [](const LabLoop& s) { return static_cast<int>(s.loop.steer_by); },
-            [](LabLoop& s, int v) { s.loop.steer_by = static_cast<lab::SteerBy>(v); })
+            [](LabLoop& s, int v) {
+                if (v < 0 || v > static_cast<int>(lab::SteerBy::kAngle))
+                    throw std::invalid_argument("steer_by: there is no such way to steer");
+                s.loop.steer_by = static_cast<lab::SteerBy>(v);
+            })
         .def_property(
             "dt", [](const LabLoop& s) { return s.loop.dt; },
             [](LabLoop& s, double v) { s.loop.dt = v; })
@@ -155,6 +161,9 @@ void register_lab_loop(py::module_& m) {
             "set_plant",
             [](LabLoop& s, double load_share, bool late_loads, bool air_speed_of_both, int steps,
                double tolerance, double gravity_mps2) {
+                if (steps < 0 || steps > kMostSteps)
+                    throw std::invalid_argument("steps: expected 0 to " +
+                                                std::to_string(kMostSteps));
                 s.plant = {load_share, late_loads, air_speed_of_both, steps, tolerance};
                 s.gravity_mps2 = gravity_mps2;
             },

@@ -117,6 +117,32 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
 
     yield "Driver", (driven, {"reaction_s": 0.1, "dt": 0.02})
 
+    def other_car(**given: Any) -> Any:
+        data = vehicle_data(vehicle)
+        for name, value in given.items():
+            setattr(data, name, value)
+        car = _core.SingleTrack(data, 0, True)
+        other = known.with_model(car)
+        return other.residuals(p, other.freeze(p, noise)), car.evaluate(p, rows(3, 20.0)[0], 0.1, 0)
+
+    names = ("mass_kg", "lf_m", "lr_m", "cg_height_m", "track_front_m", "brake_front_share")
+    yield "with_model", (other_car, {n: getattr(vehicle_data(vehicle), n) for n in names})
+    around = {"steer_before": [0.01] * 9, "steer_after": [0.02] * 9, "shift": [0.0] * len(p)}
+    yield "add_run of a longer log", (add_run, {**run, **around, "name": "log"})
+    pushed = {"references": rows(3, 20.0), "disturbance": rows(_core.EXTERNALS)}
+    read = [(0, [0], [(0, [(22, (0, 0, 0), 0.0)])], [])]
+
+    def simulate(user: Any, **given: Any) -> Any:
+        car = _core.SingleTrack(vehicle_data(vehicle), 0, True, user)
+        return _core.simulate(car, p, 0.02, driver=_core.Driver(), initial_speed=20.0, **given)
+
+    asked = {**pushed, "user": read, "channels": rows(2), "farthest_m": 5.0}
+    yield "simulate with channels", (simulate, asked)
+    places = {"pointers": np.arange(0, 2 * N, 2), "columns": np.arange(2 * N - 2) % N}
+    band = {**places, "values": rows(2)[1:].ravel()}
+    yield "banded_gram", (_core.banded_gram, {**band, "size": N})
+    yield "banded_squares", (_core.banded_squares, {**band, "factor": rows(3, 1.0)})
+
 
 NOISE = np.concatenate([np.full(_core.NOISE_PARAMETERS - 1, 0.1), [1.0]])
 
@@ -130,6 +156,9 @@ def laboratory(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
             getattr(found, name)(given[name])
         found.set_noise(given["process"], given["sensors"])
         found.set_track(given["points"], 1.0, 1.0)
+        for name in ("set_start", "set_ways", "set_plant"):
+            getattr(found, name)(*given[name])
+        found.set_observer_form(given["set_observer_form"])
         found.dt, found.steer_by = given["dt"], given["steer_by"]
         names = ("wanted", "normal", "push")
         return found.run(model.core(), model.vector(), *(given[name] for name in names))
@@ -145,6 +174,10 @@ def laboratory(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
                 "process": np.eye(6),
                 "sensors": 0.01 * np.eye(4),
                 "points": rows(2, 5.0),
+                "set_start": [15.0, 0.0, 0.0],
+                "set_ways": [0.0, True, False, 0.0, True, True],
+                "set_plant": [1.0, False, False, 0, 0.0, 9.81],
+                "set_observer_form": [True] * 5,
                 "dt": 0.01,
                 "steer_by": 0,
                 "wanted": rows(5, 15.0),
@@ -222,6 +255,9 @@ def online(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
         start = {"mean": x, "covariance": np.diag((0.1 * (high - low)) ** 2)}
         read = {"slip": slip, "mu": mu}
         how = {"noise_std": 0.05, "pseudo_noise": True, "drift_std": 1e-3 * x}
+        if name == "MagicFormulaCurve":
+            tyre = {"parameters": x}
+            yield "magic_formula_coefficients", (_core.magic_formula_coefficients, tyre)
         yield f"{name} points", (curve.points, {"slip": slip, "parameters": x})
         yield f"{name} filter", (curve.filter, {**read, **start, **how, "iterations": 2})
         yield f"{name} smooth", (curve.smooth, {**read, **start, **how, "max_rounds": 3})
@@ -244,7 +280,11 @@ def online(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     yield "SideslipUkf", (lambda **given: linear.copy().run(**given), read)
     yield "PublishedDual", (lambda **given: published.copy().run(**given), read)
     made = _core.SideslipDual(car(**of_car), {})
-    for observer in (made, linear, published):
+    others = [_core.SideslipEkf(car(**of_car), {}, False)]
+    others.append(_core.SideslipSquareRootUkf(car(**of_car), {}, False))
+    for kept in others:
+        yield type(kept).__name__, (lambda kept=kept, **given: kept.copy().run(**given), read)
+    for observer in (made, linear, published, *others):
         kind = type(observer)
         again = restored(kind, "step", 0.01, 0.01, 15.0, 0.01, 0.0, 0.1)
         yield f"{kind.__name__} restored", (again, {"state": observer.__getstate__()})

@@ -33,6 +33,9 @@ std::size_t width_of(const SparseRows& rows, std::size_t size) {
 LowerBand gram(const SparseRows& rows, std::size_t size) {
     LowerBand band{width_of(rows, size), {}};
     const std::size_t step = band.width + 1;
+    // The product of both may be more than a whole number holds, and then look small.
+    if (size > band.entries.max_size() / step)
+        throw std::invalid_argument("size: expected columns that fit into memory");
     band.entries.assign(size * step, 0.0);
     double* const entries = band.entries.data();
     for (std::size_t k = 0; k + 1 < rows.pointers.size(); ++k) {

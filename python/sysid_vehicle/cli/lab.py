@@ -55,7 +55,8 @@ def _run_arguments(parser: argparse.ArgumentParser) -> None:
         "--preset",
         choices=tuple(_PRESETS),
         default="default",
-        help="laboratory: as corrected, or as published, with its defects (default: corrected)",
+        help="laboratory: that of this package, or the published one with its defects "
+        "(default: %(default)s)",
     )
     parser.add_argument(
         "--vehicle", type=Path, metavar="TOML", help="the car (default: the published one)"

@@ -75,6 +75,8 @@ class FailureMap:
         driving : Driving
         squares, count : array, shape (n,)
             Sum and number of the squares of each sample.
+        cells : tuple of 2 ints
+            Over speed, and over lateral acceleration.
         """
         # Slow channels may never be read at the same moment.
         v = filled(driving.channel("vx_mps"))

@@ -95,15 +95,16 @@ class Driving:
         every = tuple(parts)
         logs = tuple(log for part in every for log in part.logs)
         offsets = tuple(own for part in every for own in part.offsets or ({},) * len(part.logs))
-        return cls(logs, all(part.force_known for part in every), offsets)
+        known = any(part.offsets for part in every)
+        return cls(logs, all(part.force_known for part in every), offsets if known else ())
 
     def each_log(self) -> tuple[Driving, ...]:
         """Its logs one by one, with the offsets that they have."""
-        offsets = self.offsets or ({},) * len(self.logs)
         used = range(len(self.logs)) if self.part is None else (self.part.log,)
         part = None if self.part is None else Stretch(0, self.part.where)
         return tuple(
-            replace(self, logs=(self.logs[i],), offsets=(offsets[i],), part=part) for i in used
+            replace(self, logs=(self.logs[i],), offsets=self.offsets[i : i + 1], part=part)
+            for i in used
         )
 
     @cached_property

@@ -218,8 +218,10 @@ class Fit(Estimated):
             Draws, at least; of an ensemble, those of all walkers together.
         seed : int or numpy Generator
         method : str
-            `normal`: of the normal distribution of the estimates within their bounds. `ensemble`:
-            of the likelihood itself, with the gains of the fitted filter, by emcee; minutes.
+            `normal`: of the normal distribution of the estimates within their bounds, for B of that
+            of the cornering stiffness; a warning says where the likelihood is not normal.
+            `ensemble`: of the likelihood itself, with the gains of the fitted filter, by emcee;
+            minutes, and a warning where `count` is too small for it.
         progress : bool, optional
             Show progress; by default in a terminal or a notebook.
 
@@ -229,7 +231,17 @@ class Fit(Estimated):
             For another method, where emcee is not installed, or where hardly any draw lies within
             the bounds.
         """
-        return posterior(self, self.model, self.driving, self.noise, count, seed, method, progress)
+        return posterior(
+            self,
+            self.model,
+            self.driving,
+            self.noise,
+            count,
+            seed,
+            method,
+            progress,
+            likeliest=not self.horizon_s,
+        )
 
     def to_pandas(self) -> Any:
         """A DataFrame of the estimates and what follows from them, by parameter."""

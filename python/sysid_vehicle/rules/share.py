@@ -92,11 +92,14 @@ def share_between(
         anew (Efron 1979).
     least : float
         Share of the baseline's square that must be explainable.
+    rules : Rules
+        How sure that has to be.
 
     Returns
     -------
     Share
-        Unknown where the ceiling is not below the baseline by so much in 95 % of the draws.
+        Unknown where the ceiling is not below the baseline by so much in all draws but a share
+        `alpha` of the rules.
     """
     before, after, least_left = squares.T
     explainable = before - np.minimum(least_left, after)

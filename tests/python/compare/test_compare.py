@@ -1,6 +1,7 @@
 """The one-step error of a model, by channel and by where it drives."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from sysid_vehicle import (
     identify,
     manoeuvres,
 )
-from sysid_vehicle.compare import FailureMap, Region
+from sysid_vehicle.compare import FailureMap, Region, one_step_error
 from sysid_vehicle.estimate import MEASURED
 
 
@@ -42,6 +43,17 @@ def test_a_complete_model_is_at_the_noise_floor(validation: Comparison) -> None:
         assert score.nrmse == pytest.approx(1.0, abs=0.05)
         assert score.rmse == pytest.approx(score.noise_floor, rel=0.05)
         assert score.r2 > 0.99
+
+
+def test_figures_of_a_channel_are_those_of_its_readings(
+    dragged: Comparison, fit: Fit, course: Log
+) -> None:
+    found = compare(fit, course)
+    for i, (name, score) in enumerate(found.channels.items()):
+        assert score.r2 == pytest.approx(1.0 - score.rmse**2 / np.var(course[name]), rel=1e-9)
+        assert score.nrmse == pytest.approx(np.sqrt(np.mean(found.residual[:, i] ** 2)), rel=1e-9)
+    assert dragged.channels["vx_mps"].r2 < found.channels["vx_mps"].r2 < 1.0
+    assert one_step_error(fit, Driving.of(course), fit.noise) == pytest.approx(found.error)
 
 
 def test_it_is_there_on_the_driving_it_was_fitted_to_as_well(fit: Fit) -> None:
@@ -155,6 +167,20 @@ def test_it_prints_and_draws(validation: Comparison, dragged: Comparison) -> Non
     assert set(MEASURED) <= drawn
     assert validation.plot() is not None
     assert validation.plot_residuals() is not None
+
+
+def test_residuals_are_drawn_over_the_seconds_driven(fit: Fit, course: Log) -> None:
+    """What lies between stretches and logs takes no time; a value that stands has that rms."""
+    two = compare(fit, [course.between(0.0, 10.0), course.between(20.0, 25.0)])
+    steady = replace(two, residual=np.full_like(two.residual, -2.0))
+    steady.residual[::3] = np.nan
+    line = steady.plot_residuals().get_lines()[0]
+    step = 1.0 / course.rate_hz
+    assert line.get_xdata()[-1] == pytest.approx(15.0 + step, abs=1e-6)
+    assert np.diff(line.get_xdata()) == pytest.approx(step)
+    shown = line.get_ydata()[np.isfinite(line.get_ydata())]
+    assert len(shown) == len(line.get_ydata()) - 1  # the line is broken once, between the logs
+    assert shown == pytest.approx(2.0)
 
 
 def test_cells_of_a_slow_car_have_two_ends() -> None:

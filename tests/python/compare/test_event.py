@@ -68,6 +68,9 @@ def test_a_push_in_the_training_data_is_told_with_its_seconds(pushed_fit: Fit, p
     event = seen(found.event)
     assert event.log == pushed.name
     assert event.share > 0.9
+    inside = (found.time_s >= event.from_s) & (found.time_s <= event.until_s)
+    there = np.sqrt(np.nanmean(found.residual[inside] ** 2))
+    assert event.error == pytest.approx(there, rel=0.05)  # channels by themselves and together
     assert event.error > 4.0
     assert re.search(
         r"of the squared error above the noise floor lies in [01](\.\d)? s", str(found)

@@ -31,6 +31,17 @@ def test_nothing_is_explainable_beside_the_right_model(fit: Fit, course: Log) ->
     assert "no function of steering, speed and acceleration history is shown" in str(found)
 
 
+def test_a_force_that_is_always_there_is_no_structure(truth: Model, fit: Fit) -> None:
+    """A steady wind: its mean is known from the training data, and taken off elsewhere."""
+    windy = truth.add("side_wind").with_values({"side_wind.side_force_n": 600.0})
+    logs = [
+        drive(windy, course, seed=7, rate_hz=50.0)
+        for course in (manoeuvres.lap(40.0), manoeuvres.handling_course(40.0))
+    ]
+    side = next(f for f in ceiling(fit, logs[1], logs[0]).forces if f.target == "F_y")
+    assert side.rms < 200.0
+
+
 def test_disturbances_of_the_road_are_not_explainable(truth: Model, fit: Fit) -> None:
     rough = RoadDisturbance(fy_n=400.0, mz_nm=200.0)
     logs = [

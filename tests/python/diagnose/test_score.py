@@ -11,7 +11,14 @@ from scipy.stats import chi2, kstest
 
 from sysid_vehicle import Driving, Fit, Log, Model, catalogue, drive, effect, identify, manoeuvres
 from sysid_vehicle.diagnose import considered
-from sysid_vehicle.diagnose.candidates.score import Score, ScoreBoard, score_board, score_board_of
+from sysid_vehicle.diagnose.candidates.score import (
+    Score,
+    ScoreBoard,
+    _p_value,
+    _smallest_p_values,
+    score_board,
+    score_board_of,
+)
 from sysid_vehicle.diagnose.evidence.evidence import Evidence
 from sysid_vehicle.diagnose.evidence.sensitivity import sensitivities
 from sysid_vehicle.identify import refit
@@ -26,6 +33,36 @@ def board(fit: Fit) -> ScoreBoard:
 @pytest.fixture(scope="module")
 def null_boards(complete_fits: tuple[Fit, ...]) -> list[ScoreBoard]:
     return [board(f) for f in complete_fits]
+
+
+@pytest.mark.parametrize("name", ["gyro_bias", "steer_lag", "side_wind"])
+def test_one_parameter_or_two_have_the_level_they_claim(name: str) -> None:
+    """Of either sign, of one sign only, and two of either sign."""
+    information = np.array([[4.0, 3.0], [3.0, 9.0]])[: len(effect(name).parameters)]
+    information = information[:, : len(information)]
+    rng = np.random.default_rng(4)
+    scores = rng.multivariate_normal(np.zeros(len(information)), information, size=20000)
+    p = _p_value(effect(name), scores, information)
+    for level in (0.001, 0.01, 0.05, 0.2):
+        assert np.mean(p < level) == pytest.approx(level, abs=4.0 * np.sqrt(level / 20000))
+
+
+def test_the_smallest_p_value_of_many_is_that_of_each() -> None:
+    """Of effects that are tested alike only the largest statistic is looked up."""
+    names = ("gyro_bias", "mass", "steer_lag", "force_lag", "side_wind", "body_attitude")
+    rng = np.random.default_rng(5)
+    cut, at = [], 0
+    for name in names:
+        n = len(effect(name).parameters)
+        cut.append((effect(name), slice(at, at + n)))
+        at += n
+    root = rng.standard_normal((at, at))
+    covariance = root @ root.T + np.eye(at)
+    scores = rng.multivariate_normal(np.zeros(at), covariance, size=500)
+    each = [_p_value(e, scores[:, own], covariance[own, own]) for e, own in cut]
+    np.testing.assert_allclose(
+        _smallest_p_values(cut, scores, covariance), np.min(each, axis=0), rtol=1e-9
+    )
 
 
 def test_statistics_of_a_complete_model_are_those_of_noise(null_boards: list[ScoreBoard]) -> None:
@@ -166,7 +203,11 @@ def test_directions_are_free_of_what_the_fit_can_do(fit: Fit) -> None:
     for name, R in b.directions.items():
         cosine = (G.T @ R) / np.outer(np.linalg.norm(G, axis=0), np.linalg.norm(R, axis=0))
         assert np.abs(cosine).max() < 1e-3, name
-    assert all(0.0 < s.retained <= 1.0 + 1e-9 for s in b.scores)
+    raw = sensitivities(Evidence(fit, fit.driving), tuple(s.effect for s in b.scores))
+    for s in b.scores:
+        left, whole = b.directions[s.effect.id], raw.columns[:, raw.places[s.effect.id]]
+        assert s.retained == pytest.approx(np.linalg.norm(left) / np.linalg.norm(whole), rel=1e-6)
+        assert s.retained <= 1.0 + 1e-9
 
 
 def test_an_effect_the_log_cannot_show_has_no_score(

@@ -9,6 +9,9 @@ import pytest
 
 from sysid_vehicle import Fit, Model
 from sysid_vehicle.diagnose import widened
+from sysid_vehicle.diagnose.candidates.widened import _within
+from sysid_vehicle.identify.intervals.estimates import spread_of
+from sysid_vehicle.identify.search.box import free_box
 from sysid_vehicle.study.results.widened import estimates_of, times_wider
 
 STIFFNESS = ("cornering stiffness front", "cornering stiffness rear")
@@ -49,6 +52,18 @@ def test_what_is_open_stays_within_its_bounds(hidden_fit: Callable[[str, float],
     extra = np.diag(widened(fit, fit.driving) - fit.covariance)
     width = [np.diff(fit.model.bounds(n))[0] for n in fit.model.free_names]
     assert np.all(np.sqrt(extra) < width)
+
+
+def test_bounds_count_as_a_reading_of_each_parameter(fit: Fit) -> None:
+    """Of the uniform over the box: what is far more open than that is no more open than that."""
+    spread = spread_of(free_box(fit.model), np.array([e.value for e in fit.estimates]))
+    rng = np.random.default_rng(6)
+    root = rng.standard_normal((len(spread),) * 2)
+    open_ = root @ root.T * np.outer(spread, spread)
+    found = _within(fit, open_)
+    expected = np.linalg.inv(np.linalg.inv(open_) + np.diag(1.0 / spread**2))
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * spread.max() ** 2)
+    np.testing.assert_allclose(np.diag(_within(fit, 1e6 * open_)), spread**2, rtol=0.05)
 
 
 def test_long_driving_is_worked_on_in_sections(

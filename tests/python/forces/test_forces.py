@@ -103,6 +103,35 @@ def test_mass_scales_and_the_centre_of_gravity_moves(found: sv.AxleForces) -> No
     np.testing.assert_allclose(gain[:, 1], car.lf_m / car.wheelbase_m * side, atol=1e-6)
 
 
+@pytest.mark.parametrize("cg_ahead_m", [0.0, 0.5])
+def test_forces_and_motion_meet_the_equations(found: sv.AxleForces, cg_ahead_m: float) -> None:
+    """Newton's and Euler's, of a car whose front wheels are driven too."""
+    (log,) = found.sensors.logs
+    car = found.vehicle.replace(drive_front_share=0.4)
+    told = sv.axle_forces(log, car, sensors=found.sensors, cg_ahead_m=cg_ahead_m, count=2)
+    # From what the place of the speeds feels to what the centre of gravity feels.
+    turn = log["yaw_rate_radps"][np.searchsorted(log["time_s"], told.time_s - 1e-6)]
+    tolerance = 2.0 * cg_ahead_m * 0.01 + 1e-12  # m/s2, by noise of the rate
+    np.testing.assert_allclose(
+        told.ax_mps2, found.ax_mps2 - cg_ahead_m * turn**2, atol=tolerance, rtol=0.0
+    )
+    np.testing.assert_allclose(
+        told.ay_mps2, found.ay_mps2 + cg_ahead_m * told.yaw_acceleration_radps2, atol=1e-12
+    )
+    sin, cos = np.sin(told.steer_rad), np.cos(told.steer_rad)
+    pull, (front, rear) = told.longitudinal_n, told.lateral_n.T
+    share = np.where(pull < 0.0, car.brake_front_share, car.drive_front_share)
+    drag = 0.5 * car.air_density_kgpm3 * car.drag_area_m2 * told.vx_mps**2
+    along = share * pull * cos - front * sin + (1.0 - share) * pull
+    np.testing.assert_allclose(along, car.mass_kg * told.ax_mps2 + drag, atol=1e-6)
+    across = front * cos + share * pull * sin
+    np.testing.assert_allclose(across + rear, car.mass_kg * told.ay_mps2, atol=1e-6)
+    np.testing.assert_allclose(car.lf_m * across - car.lr_m * rear, told.moment_nm, atol=1e-6)
+    shift = car.mass_kg * told.ax_mps2 * car.cg_height_m / car.wheelbase_m
+    np.testing.assert_allclose(told.load_n[:, 1] - car.static_loads_n[1], shift, atol=1e-6)
+    np.testing.assert_allclose(told.load_n.sum(axis=1), sum(car.static_loads_n), rtol=1e-12)
+
+
 def test_a_mean_slope_of_the_road_is_told(truth: Drive) -> None:
     log = truth.log.between(12.0, 18.0)
     columns = {c: np.array(log[c]) for c in log.channels}

@@ -28,6 +28,7 @@ Spoil = Callable[[np.ndarray, np.random.Generator], Any]
 
 def put(value: float) -> Spoil:
     def spoil(a: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        a = a.astype(np.float64)  # places of rows are whole numbers
         a.flat[rng.integers(0, max(a.size, 1), 3) % max(a.size, 1)] = value
         return a
 
@@ -158,6 +159,22 @@ def test_places_beyond_the_arrays_are_refused() -> None:
     law.channel = 2**64 - 1
     with pytest.raises(ValueError, match="laws: channel"):
         _core.ParameterLaws([law], 1e-3, 0, 20.0, [1.0, 1.0, 0.1])
+
+
+@pytest.mark.parametrize("size", [2**63, 2**64 - 1])
+def test_a_band_of_more_entries_than_can_be_counted_is_refused(size: int) -> None:
+    with pytest.raises(ValueError, match="size: expected columns that fit into memory"):
+        _core.banded_gram([0, 2], [0, 1], [1.0, 1.0], size)
+
+
+def test_settings_of_a_loop_that_mean_nothing_are_refused() -> None:
+    loop = _core.LabLoop()
+    for steps in (-1, 1001, 2**31 - 1):  # the last would take hours
+        with pytest.raises(ValueError, match="steps: expected 0 to 1000"):
+            loop.set_plant(1.0, False, False, steps, 0.0, 9.81)
+    for way in (-1, 3):
+        with pytest.raises(ValueError, match="steer_by: there is no such way to steer"):
+            loop.steer_by = way
 
 
 def test_a_log_that_is_none_is_refused(calls: dict[str, Call]) -> None:

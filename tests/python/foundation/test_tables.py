@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
+from sysid_vehicle.identify.intervals.posterior import Posterior
 
 KNOWN = ("C_front", "D_front", "E_front", "C_rear", "D_rear", "E_rear")
 
@@ -57,15 +58,25 @@ def test_draws_have_the_spread_of_the_fit(fit: sv.Fit) -> None:
     assert "4000 draws" in str(found)
 
 
-def test_draws_stay_within_the_bounds(truth: sv.Model, short: sv.Log) -> None:
+def test_draws_of_a_tyre_keep_what_is_known_of_it(truth: sv.Model, short: sv.Log) -> None:
     free = sv.identify(truth, short, starts=1)
-    found = free.posterior(300)
+    with pytest.warns(sv.SysidWarning, match="less likely than what the driving leaves open: by"):
+        found = free.posterior(1000)
     for name in truth.free_names:
         low, high = free.model.bounds(name)
         assert found[name].min() >= low
         assert found[name].max() <= high
+    assert "nan" not in str(found)
+    # B, C and D by themselves are known to tens of per cent, their product to 1 %.
+    for axle in ("front", "rear"):
+        stiffness = free[f"cornering stiffness {axle}"]
+        draws = found[f"cornering stiffness {axle}"]
+        assert free[f"B_{axle}"].std / free[f"B_{axle}"].value > 5 * stiffness.std / stiffness.value
+        assert draws.mean() == pytest.approx(stiffness.value, abs=0.3 * stiffness.std)
+        assert draws.std() == pytest.approx(stiffness.std, rel=0.2)
 
 
+@pytest.mark.filterwarnings("ignore:the walkers took")
 def test_an_ensemble_samples_the_likelihood(fit: sv.Fit) -> None:
     pytest.importorskip("emcee")
     found = fit.posterior(2000, seed=2, method="ensemble")
@@ -81,6 +92,22 @@ def test_an_ensemble_samples_the_likelihood(fit: sv.Fit) -> None:
     )
 
 
+@pytest.mark.slow
+def test_an_ensemble_follows_a_valley_that_bends(truth: sv.Model, short: sv.Log) -> None:
+    """Walkers that begin where no likelihood is stay there for thousands of steps."""
+    pytest.importorskip("emcee")
+    free = sv.identify(truth, short, starts=1)
+    with pytest.warns(sv.SysidWarning, match="still depend on where they began; draw .* or more"):
+        found = free.posterior(3000, seed=1, method="ensemble")
+    # Half a chi-squared number of eight parameters: its median is 3.7, one in 10^4 is beyond 16.
+    falls = found.log_density.max() - found.log_density
+    assert 1.5 < np.median(falls) < 6.0
+    assert falls.max() < 20.0
+    stiffness = free["cornering stiffness front"]
+    draws = found["cornering stiffness front"]
+    assert draws.std() == pytest.approx(stiffness.std, rel=0.3)
+
+
 @pytest.mark.filterwarnings("ignore::FutureWarning")
 def test_draws_go_to_arviz(fit: sv.Fit) -> None:
     pytest.importorskip("arviz")
@@ -90,6 +117,11 @@ def test_draws_go_to_arviz(fit: sv.Fit) -> None:
     np.testing.assert_array_equal(found.sample_stats["lp"], draws.log_density)
     assert found.posterior["B_front"].attrs["units"] == "1/rad"
     assert list(draws.to_pandas().columns) == list(draws.names)
+
+
+def test_draws_of_tyres_without_a_peak_are_printed() -> None:
+    draws = np.where(np.arange(100.0) < 90.0, 0.1, np.inf).reshape(1, 100, 1)
+    assert "0.1 .. inf" in str(Posterior(("slip",), ("rad",), draws, np.zeros((1, 100)), "normal"))
 
 
 def test_what_cannot_be_is_said(fit: sv.Fit, monkeypatch: pytest.MonkeyPatch) -> None:

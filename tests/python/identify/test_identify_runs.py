@@ -71,13 +71,15 @@ def test_the_fit_of_a_run_serves_like_any_other(found: RunsFit, runs: dict[str, 
     assert compare(found["full"], runs["empty"]).error > 1.2
 
 
-def test_it_prints_and_is_json(found: RunsFit) -> None:
+def test_it_prints_and_is_json(found: RunsFit, runs: dict[str, Log]) -> None:
     for text in (str(found), found._repr_html_()):
         for word in ("full", "empty", LOAD, "common"):
             assert word in text
     told = json.loads(json.dumps(found.to_dict()))
     assert set(told["runs"]) == set(LOADS)
     assert "differs by 0.1" in str(found.differences[0])
+    # No offsets of logs, no line of them.
+    assert f"{runs['full'].name}: " not in str(found["full"]).replace(found["full"]._headline(), "")
     with pytest.raises(KeyError, match="there are full, empty"):
         found["half"]
 

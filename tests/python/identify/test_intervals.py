@@ -7,7 +7,14 @@ import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log, Model, identify
 from sysid_vehicle.identify import profile_fit, refit
-from sysid_vehicle.identify.intervals.estimates import Estimate, wald
+from sysid_vehicle.identify.intervals.estimates import (
+    Estimate,
+    box_covariance,
+    std_of_data,
+    wald,
+)
+from sysid_vehicle.identify.intervals.estimates import profiled as with_profile
+from sysid_vehicle.identify.intervals.profile import Profile
 from sysid_vehicle.identify.search.objective import Penalised, gaussian_prior
 from sysid_vehicle.identify.search.search import Box
 
@@ -112,6 +119,39 @@ def test_a_known_inertia_can_be_freed(truth: Model) -> None:
     assert freed.priors == {name: (1700.0, 100.0)}
     assert "yaw_inertia" not in {e.id for e in freed.candidates}
     assert truth.add("mass").with_fixed({"mass.relative_error": 0.05}).drop("mass") == truth
+
+
+def test_covariances_are_inverses_whatever_the_units() -> None:
+    scale = np.array([1e-4, 1.0, 1e3])
+    information = np.outer(scale, scale) * np.array(
+        [[2.0, 0.6, 0.3], [0.6, 3.0, 0.5], [0.3, 0.5, 1.0]]
+    )
+    inverse = np.linalg.inv(information)
+    assert std_of_data(information) == pytest.approx(np.sqrt(np.diag(inverse)), rel=1e-9)
+    unfelt = np.zeros((4, 4))
+    unfelt[:3, :3] = information
+    assert np.isinf(std_of_data(unfelt)).tolist() == [False, False, False, True]
+    # Of a uniform over the box, about the estimate, where the data tell nothing.
+    box = Box([0, 1, 2], np.array([0.0, -1.0, 0.0]), np.array([1.0, 1.0, 12.0]))
+    x = np.array([0.5, 1.0, 0.0])
+    spread = np.sqrt(box.width**2 / 12.0 + np.array([0.0, 1.0, 6.0]) ** 2)
+    none = box_covariance(np.zeros((3, 3)), box, x)
+    assert np.sqrt(np.diag(none)) == pytest.approx(spread, rel=1e-12)
+    both = np.linalg.inv(information + np.diag(1.0 / spread**2))
+    assert box_covariance(information, box, x) == pytest.approx(both, rel=1e-9, abs=1e-15)
+
+
+def test_an_open_end_of_a_profile_is_at_no_place() -> None:
+    slip = Estimate("slip at the peak front", -0.2, 0.01, "rad")
+    grid = np.array([-0.3, -0.2, -0.1])
+
+    def told(below: bool, above: bool) -> Estimate:
+        found = Profile(slip.name, grid, np.zeros(3), -0.3, -0.1, below, above)
+        return with_profile(slip, (found,))
+
+    assert told(False, False).interval == (-0.3, -0.1)
+    assert (told(True, False).interval, told(True, False).note) == ((-np.inf, -0.1), "no lower end")
+    assert (told(False, True).interval, told(False, True).note) == ((-0.3, np.inf), "no upper end")
 
 
 def test_what_is_not_determined_is_not_called_at_bound() -> None:

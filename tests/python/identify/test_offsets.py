@@ -264,6 +264,9 @@ def test_joined_driving_keeps_the_offsets_of_its_parts(
     assert both.offsets == (*found.driving.offsets, *other.offsets)
     plain = Driving.joined((Driving.of(several[0]), other))
     assert plain.offsets == ({}, *other.offsets)
+    # Driving without any is not taken for driving whose logs have none.
+    none = Driving.joined((Driving.of(several[0]), Driving.of(several[1])))
+    assert [d.offsets for d in (none, *none.each_log())] == [(), (), ()]
     assert [d.logs for d in both.each_log()] == [(log,) for log in several]
 
 

@@ -58,6 +58,30 @@ def test_it_is_the_integral_over_the_parameters(
     assert gain == pytest.approx(integral, abs=0.3)
 
 
+def test_moving_the_parameters_and_their_spread_have_their_price(fit: Fit, course: Log) -> None:
+    """Laplace's approximation, put together from its parts."""
+    other = Driving.of(course)
+    found = predict(fit, other, fit.noise)
+    told, noise = _remembered(fit), fit.noise.vector()
+    problem, p = other.problem(fit.model), found.model.vector()
+    x = p[told.box.columns]
+    units = np.where(told.box.lower > 0.0, x, 1.0)
+    off = np.where(told.box.lower > 0.0, np.log(x / told.fitted), x - told.fitted)
+    moved = 0.5 * float(off @ told.information @ off)
+    _, _, learnt = problem.normal_equations(p, problem.freeze(p, noise), told.box.columns)
+    both = np.linalg.solve(told.information, learnt * np.outer(units, units))
+    narrowed = 0.5 * np.linalg.slogdet(np.eye(len(x)) + both)[1]
+    assert moved > 0.1
+    assert narrowed > 1.0
+    there = plain(replace(fit, model=found.model), other)
+    assert found.log_density.sum() == pytest.approx(there - moved - narrowed, abs=1e-3)
+    # They serve both drivings: no other parameters on the way pay less.
+    for share in (0.0, 0.5, 1.5):
+        p[told.box.columns] = told.fitted + share * (x - told.fitted)
+        at = replace(fit, model=fit.model.from_vector(p))
+        assert plain(at, other) - share**2 * moved < there - moved
+
+
 def test_what_the_fit_never_saw_is_no_reason_to_fail(gentle: Fit, lap: Log, truth: Model) -> None:
     other = Driving.of(lap)
     found = predict(gentle, other, gentle.noise)

@@ -27,7 +27,15 @@ from sysid_vehicle.lab import (
     preview,
     run_closed_loop,
 )
-from sysid_vehicle.lab.design.information import TYRES, information, problem_of, sensor_noise
+from sysid_vehicle.lab.design.information import (
+    MOTION,
+    READINGS,
+    TYRES,
+    information,
+    parameters_of,
+    problem_of,
+    sensor_noise,
+)
 
 HARD = excitation.multi_sine(lateral_mps2=16.0, speed_mps=25.0, duration_s=25.0)
 EASY = excitation.multi_sine(lateral_mps2=5.0, speed_mps=25.0, duration_s=25.0)
@@ -95,6 +103,26 @@ def test_information_is_that_of_the_scatter_of_fits(setup: Setup) -> None:
         pulls.append(float(error @ told @ error))
     # Chi-square with 48 degrees of freedom: 99.9 % lie between 23 and 84.
     assert 23.0 < sum(pulls) < 84.0
+
+
+@pytest.mark.parametrize("load_share", [1.0, 0.5])
+def test_information_is_about_the_parameters_of_the_model(setup: Setup, load_share: float) -> None:
+    """Where the simulator lets the tyres feel a share of the load, too."""
+    setup = replace(setup, simulator=replace(setup.simulator, load_share=load_share))
+    gentle = excitation.multi_sine(lateral_mps2=3.0, speed_mps=20.0, duration_s=6.0)
+    drive = run_closed_loop(gentle, setup, seed=1)
+    names, model = ["B_front", "D_front", "D_rear"], setup.plant
+    told = information(drive, model, names)
+    problem = problem_of(drive, model, READINGS)
+    frozen = problem.freeze(parameters_of(drive, model), sensor_noise(drive, MOTION).vector())
+
+    def residuals(name: str, off: float) -> np.ndarray:
+        moved = model.with_values({name: model.value(name) + off})
+        return np.nan_to_num(problem.residuals(parameters_of(drive, moved), frozen)).ravel()
+
+    step = 1e-4
+    slopes = [(residuals(n, step) - residuals(n, -step)) / (2.0 * step) for n in names]
+    np.testing.assert_allclose(told, np.inner(slopes, slopes), rtol=1e-4)
 
 
 def test_information_adds_up_and_grows_with_readings(setup: Setup) -> None:

@@ -39,6 +39,10 @@ WRONG: dict[str, tuple[Change, list[str]]] = {
         times(yaw_rate_radps=30.0 / np.pi),
         ["yaw_rate_radps: seems to be in rpm", "factor = 0.1047198 for yaw_rate_radps"],
     ),
+    "yaw rate times 6": (
+        times(yaw_rate_radps=6.0),
+        ["is 0.167 instead of about 1", "check the units of these channels and put their factors"],
+    ),
     "yaw rate in turns": (
         times(yaw_rate_radps=0.5 / np.pi),
         ["yaw_rate_radps: seems to be in turns per second: ", "factor = 6.283185 for yaw"],

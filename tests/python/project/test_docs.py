@@ -1,6 +1,7 @@
 """What the documentation names exists: files, options of commands, public names."""
 
 import ast
+import builtins
 import importlib
 import re
 import shlex
@@ -54,6 +55,21 @@ def unknown_names(code: str) -> list[str]:
     return unknown
 
 
+def undefined(code: str) -> list[str]:
+    """Names that code reads and nothing in it makes."""
+    made, read = set(vars(builtins)), set()
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Name):
+            (read if isinstance(node.ctx, ast.Load) else made).add(node.id)
+        elif isinstance(node, ast.alias):
+            made.add((node.asname or node.name).partition(".")[0])
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            made.add(node.name)
+        elif isinstance(node, ast.arg):
+            made.add(node.arg)
+    return sorted(read - made)
+
+
 @pytest.mark.parametrize("path", PAGES, ids=name)
 def test_links_lead_to_files(path: Path) -> None:
     links = re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", path.read_text("utf-8"))
@@ -79,8 +95,14 @@ def test_python_blocks_use_what_exists(path: Path) -> None:
         assert unknown_names(block) == []
 
 
+@pytest.mark.parametrize("path", PAGES, ids=name)
+def test_python_blocks_of_a_page_run_one_after_the_other(path: Path) -> None:
+    assert undefined("".join(blocks(path, "python"))) == []
+
+
 def test_the_checks_see_what_is_missing() -> None:
     assert unknown_names("sv.Log\nsv.nothing()\nonline.KINDS") == ["sv.nothing"]
+    assert undefined("import a\nb = [c for c in a.d(e)]\nf = lambda g: print(g)") == ["e"]
     with pytest.raises(SystemExit):
         parse(["compare", "a.csv", "--vehicle", "car.toml", "--nothing"])
 
@@ -128,6 +150,22 @@ def test_answers_are_in_the_tree(question: str, answer: str) -> None:
     assert (REPO / path).is_file(), path
     assert symbol, "what to look for in the file?"
     assert re.search(rf"\b{symbol}\b", (REPO / path).read_text("utf-8"))
+
+
+def test_every_figure_of_a_study_has_its_line() -> None:
+    source = (REPO / "python/sysid_vehicle/study/results/record.py").read_text("utf-8")
+    (whole,) = (
+        node.value
+        for part in ast.parse(source).body
+        if isinstance(part, ast.FunctionDef) and part.name == "record"
+        for node in part.body
+        if isinstance(node, ast.Return) and isinstance(node.value, ast.Dict)
+    )
+    keys = {ast.literal_eval(key) for key in whole.keys if key is not None}
+    text = (REPO / "docs/howto/improve.md").read_text("utf-8")
+    lines = text[text.index("| key | content |") :].splitlines()[2:]
+    told = {name for line in lines for name in re.findall(r"`(\w+)`", line.split("|")[1])}
+    assert told == keys
 
 
 def test_binder_brings_extras_that_exist() -> None:

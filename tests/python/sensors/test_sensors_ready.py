@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 import sysid_vehicle as sv
-from sysid_vehicle.sensors import made_ready
+from sysid_vehicle.sensors import explaining, made_ready
 from sysid_vehicle.sensors import ready as _ready
 from sysid_vehicle.sensors.apply import shifted
 from sysid_vehicle.sensors.condition import Conditioning, conditioned
@@ -247,7 +247,7 @@ def test_where_no_fault_is_found_no_part_is_asked(
     def refused(*_: object) -> None:
         raise RuntimeError("a part")
 
-    monkeypatch.setitem(_ready.checked.__wrapped__.__globals__, "cut", refused)
+    monkeypatch.setattr(explaining, "cut", refused)
     with pytest.raises(RuntimeError, match="a part"):
         sv.check(part)
     own, _, found = made_ready([part], [])

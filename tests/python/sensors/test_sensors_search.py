@@ -106,7 +106,7 @@ def test_an_even_road_is_soon_known(rng: np.random.Generator) -> None:
 
 def test_what_is_known_of_a_log_is_not_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search goes on from a better explanation: those without a fault are the same."""
-    module = importlib.import_module("sysid_vehicle.sensors.check")
+    module = importlib.import_module("sysid_vehicle.sensors.explaining")
     asked: list[tuple[str, ...]] = []
     estimate = module.estimate
 

@@ -58,7 +58,7 @@ def test_a_speed_that_comes_late_or_early_is(late_s: float) -> None:
 
 
 def test_slip_that_brings_another_fault_takes_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = importlib.import_module("sysid_vehicle.sensors.check")
+    module = importlib.import_module("sysid_vehicle.sensors.explaining")
     told: Callable[..., tuple[SensorFault, ...]] = module.faults_of
 
     def with_another(found: Estimate, *rest: Any, **more: Any) -> tuple[SensorFault, ...]:

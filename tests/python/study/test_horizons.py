@@ -48,6 +48,11 @@ def test_errors_are_in_the_units_of_the_channels(fit: Fit, late: Fit, course: Lo
     assert np.all(found.error[0] > 0.7 * found.noise)
     assert np.all(found.low <= found.error)
     assert np.all(found.error <= found.high)
+    for i, model in enumerate((fit, late)):
+        blocks = block_errors(model, late.noise.floor(), driving, (0.5, 2.0))
+        for q, told_of in ((0.1, found.low), (0.5, found.error), (0.9, found.high)):
+            assert np.all(told_of[i] >= np.quantile(blocks, q, axis=0, method="lower"))
+            assert np.all(told_of[i] <= np.quantile(blocks, q, axis=0, method="higher"))
     yaw = PREDICTED.index("yaw_rate_radps")
     assert np.all(found.error[1, :, yaw] > 2.0 * found.error[0, :, yaw])
     assert found.gains(1)["yaw_rate_radps"][0] < 0.0

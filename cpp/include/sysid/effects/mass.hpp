@@ -12,7 +12,7 @@ struct Mass : Effect {
         .id = "mass",
         .title = "mass differs from the vehicle file",
         .equation = "m *= 1 + e",
-        .source = "Rajamani, Vehicle Dynamics and Control, ch. 14",
+        .source = "Rajamani, Vehicle Dynamics and Control, eq. (4.1)",
         .excited_by = "a longitudinal force known in newtons",
         .moves = "ax_mps2, vx_mps",
         .needs = "fx_n, vx_mps, steer_rad, yaw_rate_radps",

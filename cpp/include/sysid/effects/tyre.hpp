@@ -213,7 +213,8 @@ struct AligningMoment : Effect {
         .title = "aligning moment of the tyres: pneumatic trail",
         .equation = "M_z -= sum_i t F_y,i / (1 + (B_i alpha_i)^2)",
         .source =
-            "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (4.E33) with C_t = 2, D_t constant",
+            "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (4.E33), whose cosine is squared "
+            "here with C_t = 1, D_t constant",
         .excited_by = "gentle sweeps, then a ramp to the limit",
         .moves = "yaw_rate_radps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",

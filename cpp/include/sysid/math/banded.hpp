@@ -24,7 +24,8 @@ struct LowerBand {
 };
 
 /// Product of the transposed rows with the rows, of `size` columns.
-/// Throws std::invalid_argument where an entry has no such column or a row no such entries.
+/// Throws std::invalid_argument where an entry has no such column, a row no such entries, or so
+/// many columns no room.
 LowerBand gram(const SparseRows& rows, std::size_t size);
 
 /// Squared lengths of what the inverse of a Cholesky factor makes of rows, one for each: variances

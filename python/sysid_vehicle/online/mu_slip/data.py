@@ -187,6 +187,8 @@ def simulate_mu_slip(
     ----------
     values : sequence of float
         Parameters of the curve.
+    curve : MuSlipCurve
+        `TWO_PARAMETER` or `MAGIC_FORMULA`.
     noise_std : float
         Standard deviation of a reading; the estimators are told it.
     slip : array_like, optional

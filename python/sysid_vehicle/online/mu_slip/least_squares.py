@@ -36,6 +36,9 @@ def mu_slip_fit(
 
     Parameters
     ----------
+    data : MuSlipData
+    curve : MuSlipCurve
+        `TWO_PARAMETER` or `MAGIC_FORMULA`.
     start : array_like, optional
         Where to begin. If left out the better of two results is given: from the mean of the
         curve's prior, and from the highest readings.

@@ -166,6 +166,8 @@ def mu_slip_over_noise(
     ----------
     values : sequence of float
         True parameters of the curve.
+    curve : MuSlipCurve
+        `TWO_PARAMETER` or `MAGIC_FORMULA`.
     noise_std : array_like, shape (m,)
         Standard deviations of a reading.
     slip : array_like, optional

@@ -295,12 +295,45 @@ def _read_slow(
     first_line: int,
     annotated: bool,
 ) -> Table:
-    rows: list[list[str]] = []
-    lines: list[int] = []
     # A logger that begins anew, or files that were joined.
     heads = {names, tuple(units.get(name, "") for name in names)} - {("",) * len(names)}
-    repeated: list[int] = []
     notes: list[str] = []
+    rows, lines, repeated = _full_rows(body, delimiter, names, heads, first_line, notes)
+    columns, not_numbers, seconds, texts = {}, {}, {}, {}
+    for name, cells in zip(names, zip(*rows, strict=True), strict=True):
+        try:
+            values = _floats(cells)
+        except ValueError:
+            first = next(k for k, c in enumerate(cells) if c.strip() and not is_number(c))
+            not_numbers[name] = BadCell(cells[first].strip(), first, lines[first])
+            stamps = seconds_of_stamps(cells)
+            if stamps is not None:
+                seconds[name] = stamps
+            else:
+                texts[name] = cells
+        else:
+            columns[name] = values
+    notes += [
+        f"line {line} repeats column names or units and was left out; read logs that were joined "
+        f"one by one"
+        for line in repeated[:1]
+        if not annotated
+    ]
+    return Table(names, columns, not_numbers, len(rows), units, seconds, tuple(notes), texts)
+
+
+def _full_rows(
+    body: str,
+    delimiter: str,
+    names: tuple[str, ...],
+    heads: set[tuple[str, ...]],
+    first_line: int,
+    notes: list[str],
+) -> tuple[list[list[str]], list[int], list[int]]:
+    """Rows with a cell for each name, their lines, and the lines that repeat one of `heads`."""
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    repeated: list[int] = []
     last = first_line + body.rstrip().count("\n")
     for line, row in _rows(body, delimiter, first_line):
         if not row or not any(cell.strip() for cell in row):
@@ -329,27 +362,7 @@ def _read_slow(
         raise InvalidInput(
             "there are only empty cells below the column names; record the log again"
         )
-    columns, not_numbers, seconds, texts = {}, {}, {}, {}
-    for name, cells in zip(names, zip(*rows, strict=True), strict=True):
-        try:
-            values = _floats(cells)
-        except ValueError:
-            first = next(k for k, c in enumerate(cells) if c.strip() and not is_number(c))
-            not_numbers[name] = BadCell(cells[first].strip(), first, lines[first])
-            stamps = seconds_of_stamps(cells)
-            if stamps is not None:
-                seconds[name] = stamps
-            else:
-                texts[name] = cells
-        else:
-            columns[name] = values
-    notes += [
-        f"line {line} repeats column names or units and was left out; read logs that were joined "
-        f"one by one"
-        for line in repeated[:1]
-        if not annotated
-    ]
-    return Table(names, columns, not_numbers, len(rows), units, seconds, tuple(notes), texts)
+    return rows, lines, repeated
 
 
 def _floats(cells: Sequence[str]) -> FloatArray:

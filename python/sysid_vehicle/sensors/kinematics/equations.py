@@ -214,7 +214,8 @@ def _read(
             for kind, slip in zip(SLIPS, readings.slips.T, strict=True):
                 by_fault[kind] = gain * value * slip
             slipped = 1.0 + readings.slips @ np.array([faults.get(kind, 0.0) for kind in SLIPS])
-            value, weights = value * slipped, slipped[:, None] * weights
+            value, weights, rate = value * slipped, slipped[:, None] * weights, rate * slipped
+        rate = gain * rate
         by_fault[f"gain.{name}"] = value
         expected = gain * value + faults.get(f"bias.{name}", 0.0)
 
