@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -113,9 +113,12 @@ class TyreLog:
         v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]; NaN where missing. v_y may be missing
         throughout.
     inputs : array, shape (n, 4)
-        Longitudinal force [N], road-wheel angle [rad], axle loads front and rear [N], each held
-        from its sample to the next.
+        Longitudinal force [N], road-wheel angle [rad], axle loads front and rear [N].
     name : str
+    inputs_held : bool, optional
+        Whether each input is held from its sample to the next, as a digital controller holds it,
+        or goes there in a straight line, as a driver turns the wheel. If left out, the likelihood
+        of all logs together decides.
 
     Raises
     ------
@@ -128,6 +131,7 @@ class TyreLog:
     measurements: FloatArray
     inputs: FloatArray
     name: str = "log"
+    inputs_held: bool | None = None
 
     @typed_fields
     def __post_init__(self) -> None:
@@ -177,8 +181,9 @@ class TyreLog:
         *,
         load_delay_samples: int = 0,
         name: str = "log",
+        inputs_held: bool | None = True,
     ) -> TyreLog:
-        """From arrays as a simulation logs them.
+        """From arrays as a simulation logs them, with inputs that a controller holds.
 
         Parameters
         ----------
@@ -191,6 +196,8 @@ class TyreLog:
         load_delay_samples : int
             Samples by which the loads act later than they are logged.
         name : str
+        inputs_held : bool, optional
+            As in `TyreLog`.
         """
         u, f = as_float64(force_and_steer), as_float64(loads)
         for what, a in (("force_and_steer", u), ("loads", f)):
@@ -203,7 +210,8 @@ class TyreLog:
             )
         if load_delay_samples > 0:
             f = np.vstack([np.repeat(f[:1], load_delay_samples, axis=0), f[:-load_delay_samples]])
-        return cls(step_s, as_float64(measurements), as_float64(np.column_stack([u, f])), name)
+        inputs = as_float64(np.column_stack([u, f]))
+        return cls(step_s, as_float64(measurements), inputs, name, inputs_held)
 
     @classmethod
     @typed
@@ -264,7 +272,7 @@ class TyreLog:
         """The same drive without its v_y."""
         y = self.measurements.copy()
         y[:, 1] = np.nan
-        return TyreLog(self.step_s, y, self.inputs, self.name)
+        return replace(self, measurements=y)
 
     @typed
     def with_kinematic_sideslip(self, window_s: float = 10.0) -> TyreLog:
@@ -279,13 +287,13 @@ class TyreLog:
         window = np.ones(2 * half + 1)
         drift = np.convolve(v_y, window, "same") / np.convolve(np.ones(self.n), window, "same")
         y[:, 1] = v_y - drift
-        return TyreLog(self.step_s, y, self.inputs, self.name)
+        return replace(self, measurements=y)
 
     @typed
     def cut(self, first: int, last: int) -> TyreLog:
         """Samples `first` up to, not including, `last`."""
-        return TyreLog(
-            self.step_s, self.measurements[first:last], self.inputs[first:last], self.name
+        return replace(
+            self, measurements=self.measurements[first:last], inputs=self.inputs[first:last]
         )
 
     def __str__(self) -> str:
