@@ -80,12 +80,13 @@ def identify_tyres(
     Raises
     ------
     InvalidInput
-        No log, an unknown method or parameter, less than one start, inputs of two kinds.
+        No log, an unknown method or parameter, less than one start, a negative seed, inputs of two
+        kinds.
     NumericalError
         No start led anywhere.
     """
     several = (logs,) if isinstance(logs, TyreLog) else tuple(logs)
-    _check(several, method, starts)
+    _check(several, method, starts, seed)
     _check_loads(several, vehicle)
     free = free_parameters(vehicle, residual_terms=residual_terms)
     p = first_point(start or {})
@@ -242,12 +243,13 @@ def _check_loads(logs: Sequence[TyreLog], vehicle: GreyBoxVehicle) -> None:
             )
 
 
-def _check(logs: tuple[TyreLog, ...], method: str, starts: int) -> None:
+def _check(logs: tuple[TyreLog, ...], method: str, starts: int, seed: int) -> None:
     if not logs:
         raise InvalidInput("no log was given; pass one TyreLog or a list of them")
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
     whole(starts, "starts", 1)
+    whole(seed, "seed")
     if len({log.inputs_held for log in logs} - {None}) > 1:
         held = next(log.name for log in logs if log.inputs_held)
         raise InvalidInput(

@@ -203,7 +203,7 @@ def validate_tyres(
 
 
 def _validation(car: IdentifiedCar, log: TyreLog, horizon_s: float) -> Validation:
-    ahead = round(horizon_s / log.step_s)
+    ahead = round(horizon_s / log.step_s) if np.isfinite(horizon_s) else 0
     if not 1 < ahead < log.n:
         raise InvalidInput(
             f"{log.name}: {horizon_s:g} s ahead in a drive of {log.n * log.step_s:g} s, sampled "
