@@ -290,8 +290,8 @@ def learn_observer_noise(
     Raises
     ------
     InvalidInput
-        No record, no iteration, too few readings, a structure that contradicts itself, or a start it cannot
-        leave.
+        No record, no iteration, too few readings, a structure that contradicts itself, or a start
+        it cannot leave.
     NumericalError
         The filter broke down.
     """
