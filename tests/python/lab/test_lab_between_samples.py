@@ -1,4 +1,4 @@
-"""Steering that a controller holds from sample to sample, and steering that a driver turns."""
+"""What inputs are: held from sample to sample or turned by a driver, a force or an acceleration."""
 
 import math
 
@@ -34,11 +34,11 @@ def rates(x: tuple[float, ...], steer: float, force: float) -> tuple[float, ...]
     )
 
 
-def driven(seed: int, *, held: bool) -> sv.Log:
+def driven(seed: int, *, held: bool, force: bool = True, turn: float = 0.18) -> sv.Log:
     """Twenty Runge-Kutta steps a sample, by nothing of the package."""
     rng = np.random.default_rng(seed)
     at = np.arange(0.0, SAMPLES * STEP_S + 1.0, 0.3)
-    turned = 0.18 * rng.standard_normal(at.size)
+    turned = turn * rng.standard_normal(at.size)
 
     def steering(t: float) -> float:
         return float(np.interp(STEP_S * math.floor(t / STEP_S + 1e-9) if held else t, at, turned))
@@ -46,21 +46,21 @@ def driven(seed: int, *, held: bool) -> sv.Log:
     x: tuple[float, ...] = (3.5, 0.0, 0.0)
     rows, h = np.empty((SAMPLES, 7)), STEP_S / PARTS
     for k in range(SAMPLES):
-        force = 6.0 * (3.5 - x[0])
+        pull = 6.0 * (3.5 - x[0])
         steer = steering(k * STEP_S)
-        v_dot = rates(x, steer, force)
-        rows[k] = (steer, force, *x, v_dot[0] - x[1] * x[2], v_dot[1] + x[0] * x[2])
+        v_dot = rates(x, steer, pull)
+        rows[k] = (steer, pull, *x, v_dot[0] - x[1] * x[2], v_dot[1] + x[0] * x[2])
         for part in range(PARTS):
             t = k * STEP_S + part * h
 
             def after(k_: tuple[float, ...], share: float, x: tuple[float, ...] = x) -> tuple:
                 return tuple(a + share * h * b for a, b in zip(x, k_, strict=True))
 
-            k1 = rates(x, steering(t), force)
+            k1 = rates(x, steering(t), pull)
             middle = steering(t + 0.5 * h)
-            k2 = rates(after(k1, 0.5), middle, force)
-            k3 = rates(after(k2, 0.5), middle, force)
-            k4 = rates(after(k3, 1.0), steering(t + (1.0 - 1e-6) * h), force)
+            k2 = rates(after(k1, 0.5), middle, pull)
+            k3 = rates(after(k2, 0.5), middle, pull)
+            k4 = rates(after(k3, 1.0), steering(t + (1.0 - 1e-6) * h), pull)
             x = tuple(
                 a + h / 6.0 * (p + 2.0 * q + 2.0 * u + w)
                 for a, p, q, u, w in zip(x, k1, k2, k3, k4, strict=True)
@@ -69,6 +69,8 @@ def driven(seed: int, *, held: bool) -> sv.Log:
     columns = dict(zip(names, rows.T.copy(), strict=True))
     for name, std in zip(("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2"), SENSORS, strict=True):
         columns[name] += std * rng.standard_normal(SAMPLES)
+    if not force:
+        del columns["fx_n"]
     return sv.Log.from_arrays({"time_s": STEP_S * np.arange(SAMPLES), **columns}, name="small")
 
 
@@ -114,3 +116,17 @@ def test_logs_of_two_kinds_are_refused() -> None:
     moving = lab.TyreLog(log.step_s, log.measurements, log.inputs, "moving", inputs_held=False)
     with pytest.raises(InvalidInput, match="other: inputs_held is True, of other logs False"):
         lab.identify_tyres(CAR, [moving, other], starts=1)
+
+
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
+def test_without_a_wheel_force_side_forces_count_once() -> None:
+    """The measured acceleration has the side force of turned wheels in it, and the drag."""
+    logs = lab.TyreLog.from_log(driven(9, held=False, force=False, turn=0.3), CAR)
+    fit = lab.identify_tyres(CAR, logs, starts=2, profiles=False)
+    assert "drag_area_m2" not in [e.name for e in fit.estimates]
+    for axle, tyre in zip(("front", "rear"), TYRES, strict=True):
+        found = fit[f"BCD_{axle}"]
+        assert abs(found.value - tyre[0] * tyre[1] * tyre[2]) < 3.5 * found.std
+    known = lab.TyreLog.from_log(driven(10, held=False), CAR)
+    with pytest.raises(InvalidInput, match=r"small: no wheel force .fx_n., which other logs have"):
+        lab.identify_tyres(CAR, [*logs, *known], starts=1)

@@ -81,15 +81,16 @@ def identify_tyres(
     ------
     InvalidInput
         No log, an unknown method or parameter, less than one start, a negative seed, inputs of two
-        kinds.
+        kinds, a wheel force in some logs only.
     NumericalError
         No start led anywhere.
     """
     several = (logs,) if isinstance(logs, TyreLog) else tuple(logs)
     _check(several, method, starts, seed)
     _check_loads(several, vehicle)
-    free = free_parameters(vehicle, residual_terms=residual_terms)
-    p = first_point(start or {})
+    known = several[0].force_known
+    free = free_parameters(vehicle, residual_terms=residual_terms, force_known=known)
+    p = first_point({**(start or {}), **({} if known else {"drag_area_m2": 0.0})})
     box = box_of(free, {})
     given = np.clip(p[box.columns], box.lower, box.upper)
     begins = space_filling(given, box.lower, box.upper, starts, seed, list(range(8)))
@@ -255,6 +256,12 @@ def _check(logs: tuple[TyreLog, ...], method: str, starts: int, seed: int) -> No
         raise InvalidInput(
             f"{held}: inputs_held is True, of other logs False; identify from logs of one kind, or "
             "leave it out"
+        )
+    if len({log.force_known for log in logs}) > 1:
+        without = next(log.name for log in logs if not log.force_known)
+        raise InvalidInput(
+            f"{without}: no wheel force (fx_n), which other logs have; identify from logs of one "
+            "kind, or leave fx_n out of all"
         )
     blind = [log.name for log in logs if not log.sideslip_measured]
     if blind:

@@ -101,10 +101,16 @@ def _tolerances(vehicle: GreyBoxVehicle) -> dict[str, float]:
     return {name: tolerance for name, tolerance in stated.items() if tolerance > 0.0}
 
 
-def free_parameters(vehicle: GreyBoxVehicle, *, residual_terms: bool = False) -> tuple[str, ...]:
-    """Names of what is identified: both tyres, what the vehicle is not sure of, the drag."""
+def free_parameters(
+    vehicle: GreyBoxVehicle, *, residual_terms: bool = False, force_known: bool = True
+) -> tuple[str, ...]:
+    """Names of what is identified: both tyres, what the vehicle is not sure of, the drag.
+
+    A measured acceleration has the drag in it, which then is none of them.
+    """
     terms = ("P1", "P2", "P3") if residual_terms else ()
-    return (*PARAMETERS[:8], *terms, *_tolerances(vehicle), "drag_area_m2")
+    drag = ("drag_area_m2",) if force_known else ()
+    return (*PARAMETERS[:8], *terms, *_tolerances(vehicle), *drag)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +128,12 @@ class TyreProblem:
 
     @classmethod
     def of(
-        cls, vehicle: GreyBoxVehicle, *, residual_terms: bool, inputs_held: bool = True
+        cls,
+        vehicle: GreyBoxVehicle,
+        *,
+        residual_terms: bool,
+        inputs_held: bool = True,
+        force_known: bool = True,
     ) -> TyreProblem:
         """Without runs; P1, P2, P3 act only in a problem with `residual_terms`."""
         terms = trace(
@@ -136,7 +147,7 @@ class TyreProblem:
             mask |= effect(name).bit
         own: tuple[Any, ...] = (0, [], ((TARGETS.index("force_y"), terms.steps),), [])
         users = [own] if residual_terms else []
-        model = _core.SingleTrack(vehicle.core(), mask, True, users, True, inputs_held)
+        model = _core.SingleTrack(vehicle.core(), mask, force_known, users, True, inputs_held)
         return cls(_core.Problem(model), vehicle.yaw_inertia_kgm2)
 
     def add_run(self, step_s: float, inputs: FloatArray, measurements: FloatArray) -> None:
@@ -235,7 +246,12 @@ def tyre_problem(
     spread evenly over the rest. Inputs of which nothing is said are taken as held.
     """
     held = all(log.inputs_held is not False for log in logs)
-    problem = TyreProblem.of(vehicle, residual_terms=residual_terms, inputs_held=held)
+    problem = TyreProblem.of(
+        vehicle,
+        residual_terms=residual_terms,
+        inputs_held=held,
+        force_known=all(log.force_known for log in logs),
+    )
     total = sum(log.n for log in logs)
     for log in logs:
         windows = [slice(0, log.n)]
