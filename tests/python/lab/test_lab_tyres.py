@@ -354,8 +354,7 @@ def test_reads_a_driving_log() -> None:
     assert same.measurements == pytest.approx(drive.measurements)
     (blind,) = TyreLog.from_log(as_log(drive, sideslip=False), CAR)
     assert not blind.sideslip_measured
-    # Without load columns: those at rest, and what braking moves forwards; without a wheel force
-    # the acceleration that was measured.
+    # Without loads those at rest, and what braking moves; without a force the acceleration.
     plain = {
         "time_s": drive.time_s,
         "vx_mps": drive.measurements[:, 0],
