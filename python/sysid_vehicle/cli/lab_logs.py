@@ -190,6 +190,9 @@ def validate(args: argparse.Namespace, heard: list[str]) -> None:
     """Predict, print, and write what was asked for."""
     car = IdentifiedCar.from_json(args.tyres)
     read = read_logs(args.logs, args, None)
+    of, base = car.vehicle, car.vehicle.lf_m + car.vehicle.lr_m
+    for log in () if args.unchecked else read:
+        check_car(log, mass_kg=of.mass_kg, wheelbase_m=base, lf_m=of.lf_m)
     logs = [part for log in read for part in TyreLog.from_log(log, car.vehicle)]
     found = validate_tyres(car, logs, horizon_s=args.horizon)
     print("\n\n".join(map(str, found)))

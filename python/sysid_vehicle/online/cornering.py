@@ -218,8 +218,9 @@ def cornering_stiffness(
     forgetting : float
         Weight of the past per used sample, 0.98 to 1.
     window_s : float, optional
-        Slip angles and lateral acceleration are smoothed, and the yaw acceleration is taken, by
-        local parabolas of this length, the same for all so that none lags. If left out, as long as
+        Slip angles, lateral acceleration and yaw rate are smoothed by local parabolas of this
+        length, the same for all so that none lags or fades; from the yaw rate follows the yaw
+        acceleration. If left out, as long as
         it takes for the noise of sideslip and yaw rate to be no more than 1 % of the variance of
         either slip angle, at most 1 s: noise in what is regressed on makes the stiffness too small.
     **settings : float
@@ -265,12 +266,11 @@ def cornering_stiffness(
             f"or a shorter window_s"
         )
     step = 1.0 / log.rate_hz
-    readings = np.column_stack(
-        [
-            _parabolas(y, width, derivative, step)
-            for y, derivative in ((slips[0], 0), (slips[1], 0), (log["ay_mps2"], 0), (rate, 1))
-        ]
-    )
+    smooth = [_parabolas(y, width) for y in (*slips, log["ay_mps2"], rate)]
+    # The slope of a local parabola fades sooner with frequency than its value does: next to values
+    # it would be too small, and the stiffness with it.
+    smooth[3] = np.gradient(smooth[3], step)
+    readings = np.column_stack(smooth)
     found = CorneringRls(vehicle, forgetting=forgetting, **settings).run(readings).T
     cf, cr, cf_std, cr_std, used = found
     # Noise of the slips, which both axles share, times the stiffness is one of the readings.
@@ -348,8 +348,8 @@ def _root_mean(noise: FloatArray, used: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(squares / np.maximum(np.cumsum(known), 1)))
 
 
-def _parabolas(y: FloatArray, width: int, derivative: int, step_s: float) -> FloatArray:
-    """Local parabolas over `width` samples, or their slope; NaN where too much is missing.
+def _parabolas(y: FloatArray, width: int) -> FloatArray:
+    """Local parabolas over `width` samples; NaN where too much is missing.
 
     Holes of up to half a window are interpolated first: the parabolas hardly feel them. Longer ones
     stay, and so do stretches between them that are shorter than a window.
@@ -363,7 +363,7 @@ def _parabolas(y: FloatArray, width: int, derivative: int, step_s: float) -> Flo
         rows = np.arange(part[0], part[-1] + 1)
         if rows.size >= width:
             dense = np.interp(rows, part, y[part])
-            out[rows] = scipy.signal.savgol_filter(dense, width, 2, deriv=derivative, delta=step_s)
+            out[rows] = scipy.signal.savgol_filter(dense, width, 2)
     return out
 
 

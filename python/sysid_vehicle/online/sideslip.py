@@ -28,7 +28,7 @@ KINDS: Mapping[str, str] = {
     "square-root-ukf": "the same as a square-root UKF",
     "linear-ukf": "the UKF with tyres that do not saturate",
 }
-_SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 
 
 class SideslipEstimate(NamedTuple):
@@ -184,9 +184,9 @@ class SideslipObserver:
             Columns in the order of :class:`SideslipEstimate`.
         """
         dt_s, sensors = as_float64(dt_s), as_float64(sensors)
-        if sensors.ndim != 2 or sensors.shape[1] != len(_SENSORS):
+        if sensors.ndim != 2 or sensors.shape[1] != len(SENSORS):
             raise InvalidInput(
-                f"sensors: shape {sensors.shape}; give (n, 5) with columns {', '.join(_SENSORS)}"
+                f"sensors: shape {sensors.shape}; give (n, 5) with columns {', '.join(SENSORS)}"
             )
         if dt_s.shape != (len(sensors),):
             raise InvalidInput(f"dt_s: shape {dt_s.shape}; give ({len(sensors)},), as sensors")
@@ -248,7 +248,7 @@ def estimate_sideslip(
     vehicle : Vehicle
         The car; its tyres are where adaptation begins.
     log : Log
-        Needs ``ax_mps2`` besides the channels every log has.
+        Without ``ax_mps2`` the speed tells how the car brakes and drives.
     kind : str
         One of :data:`KINDS`.
     settings : SideslipSettings, optional
@@ -260,7 +260,7 @@ def estimate_sideslip(
     Raises
     ------
     InvalidInput
-        If a channel is absent, the kind is not known, or wheel force or steering angle are not
+        If the kind is not known, or wheel force or steering angle are not
         those of a car of this mass and wheelbase.
     NumericalError
         If the filter leaves the range of numbers; the message gives the sample.
@@ -268,10 +268,15 @@ def estimate_sideslip(
     Warns
     -----
     SysidWarning
-        If the car is too slow for the observer all the time, the tyres of the vehicle file do not
-        fit the drive, or the dual observer has learnt far softer ones.
+        If there is no ``ax_mps2``, the car is too slow for the observer all the time, the tyres of
+        the vehicle file do not fit the drive, or the dual observer has learnt far softer ones.
     """
     check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m, lf_m=vehicle.lf_m)
+    if not log.has("ax_mps2"):
+        warn(
+            f"{log.name}: there is no channel 'ax_mps2': the speed alone tells how the car brakes, "
+            "later and less surely; record it"
+        )
     settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
     run = run_over(log, SideslipObserver(vehicle, settings, kind), settings)
     if kind == "dual":
@@ -283,11 +288,17 @@ def estimate_sideslip(
 
 def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -> SideslipRun:
     """Run an observer over a whole log."""
-    sensors = np.column_stack([log[name] for name in _SENSORS])
+    unread = np.full(log.n, np.nan)
+    sensors = np.column_stack([log[name] if log.has(name) else unread for name in SENSORS])
     dt = np.full(log.n, 1.0 / log.rate_hz)
     columns = observer.run(dt, sensors).T.copy()
     mode = columns[SideslipEstimate._fields.index("mode")]
-    mode[_between_readings(sensors) & (mode == 2)] = 0.0
+    # What a log never had is told once; it is no failure of a moment.
+    had = sensors[:, [log.has(name) for name in SENSORS]]
+    excused = _between_readings(had)
+    if had.shape != sensors.shape:
+        excused = np.asarray(excused | np.isfinite(had).all(axis=1))
+    mode[excused & (mode == 2)] = 0.0
     found = SideslipEstimate._make(columns)
     true_beta = true_std = None
     if log.has("vy_mps"):

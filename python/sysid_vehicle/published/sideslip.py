@@ -8,7 +8,7 @@ from __future__ import annotations
 from .. import _core
 from ..log import Log
 from ..online import SideslipObserver, SideslipRun, SideslipSettings
-from ..online.sideslip import observed_car, run_over, static_stiffness
+from ..online.sideslip import SENSORS, observed_car, run_over, static_stiffness
 from ..vehicle import Vehicle
 
 
@@ -39,4 +39,6 @@ def estimate_sideslip(vehicle: Vehicle, log: Log) -> SideslipRun:
     NumericalError
         If a reading is missing or no car gives it, or the filter diverges.
     """
+    for name in SENSORS:
+        log[name]  # the observer of today does without some, this one does not
     return run_over(log, PublishedSideslipObserver(vehicle), SideslipSettings.of(log))

@@ -13,20 +13,23 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
+import platform
 import shutil
 import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
 from .._common.typed import typed
 from ..errors import InvalidInput, NumericalError, near_names
+from .checks import checked_step
+from .fmu_file import Kind, fmpy_module, kind_of, read_description
 
-Kind = Literal["model_exchange", "co_simulation"]
 _AXES = 3
 
 
@@ -100,8 +103,9 @@ class FMUTwin:
     Raises
     ------
     InvalidInput
-        If FMPy is not installed, the FMU lacks a variable, a parameter is not tunable, or it does
-        not offer `kind`.
+        If FMPy is not installed, the file is no FMU or has no library for this machine, the FMU
+        lacks a variable, a parameter is not tunable, a start value is no number, or it does not
+        offer `kind`.
     """
 
     @typed
@@ -113,13 +117,13 @@ class FMUTwin:
         dt_s: float = 1e-3,
         kind: Kind | None = None,
     ) -> None:
-        fmpy = _fmpy()
+        fmpy = fmpy_module()
         if not Path(path).is_file():
             raise InvalidInput(f"{path}: there is no such file")
-        self._path, self._variables, self.dt_s = path, variables, dt_s
-        self._description = fmpy.read_model_description(str(path))
+        self._path, self._variables, self.dt_s = path, variables, checked_step(dt_s)
+        self._description = read_description(str(path))
         self._version = 3 if self._description.fmiVersion.startswith("3") else 2
-        self.kind = _kind(self._description, kind, str(path))
+        self.kind = kind_of(self._description, kind, str(path))
         self._alive = _Alive(fmpy.extract(str(path)))
         # Whoever lets go of the twin, or stops half-way through its making, leaves nothing behind.
         self._finalizer = weakref.finalize(self, self._alive.end)
@@ -220,16 +224,28 @@ class FMUTwin:
     def _start(self) -> None:
         from fmpy.simulation import instantiate_fmu
 
-        self._alive.fmu = instantiate_fmu(
-            self._alive.folder,
-            self._description,
-            "ModelExchange" if self.kind == "model_exchange" else "CoSimulation",
-            require_functions=False,
-        )
+        try:
+            self._alive.fmu = instantiate_fmu(
+                self._alive.folder,
+                self._description,
+                "ModelExchange" if self.kind == "model_exchange" else "CoSimulation",
+                require_functions=False,
+            )
+        except Exception as error:
+            raise InvalidInput(
+                f"{self._path}: the FMU cannot be loaded ({error}); export it with a library for "
+                f"{platform.system()} on {platform.machine()}"
+            ) from error
         if self._version == 2:
             self._fmu.setupExperiment(startTime=0.0)
         self._fmu.enterInitializationMode()
         names = list(self._variables.start)
+        for name in names:
+            if not math.isfinite(self._variables.start[name]):
+                raise InvalidInput(
+                    f"{self._path}: start of '{name}' is {self._variables.start[name]}; give a "
+                    f"number"
+                )
         self._set(self._references(names), [float(self._variables.start[n]) for n in names])
         self._fmu.exitInitializationMode()
         if self.kind == "model_exchange":
@@ -355,29 +371,3 @@ class FMUTwin:
             self._fmu.freeFMUState(state)
             other._fmu.setFMUState(other._fmu.deserializeFMUState(bytes_))
         return other
-
-
-def _fmpy() -> Any:
-    try:
-        import fmpy
-    except ImportError as error:
-        raise InvalidInput(
-            "a twin from an FMU needs FMPy: pip install 'sysid-vehicle[fmu]'"
-        ) from error
-    return fmpy
-
-
-def _kind(description: Any, wanted: Kind | None, path: str) -> Kind:
-    offered: list[Kind] = []
-    if description.modelExchange is not None:
-        offered.append("model_exchange")
-    if description.coSimulation is not None:
-        offered.append("co_simulation")
-    if wanted is None and offered:
-        return offered[0]
-    if wanted is None or wanted not in offered:
-        raise InvalidInput(
-            f"{path} does not offer {wanted or 'anything that can be run'}; it offers "
-            f"{', '.join(offered) or 'nothing'}"
-        )
-    return wanted

@@ -247,7 +247,7 @@ class SideBySide:
     Raises
     ------
     InvalidInput
-        If a spread, a step, a noise or a time is not positive, or limits are reversed.
+        If a spread, step, noise or time is not positive, limits are reversed, or steps exceed them.
     """
 
     unknowns: Sequence[Unknown]
@@ -271,9 +271,11 @@ class SideBySide:
                 raise InvalidInput(f"{name} = {getattr(self, name)!r}; give a number from 0 on")
         for u in self.unknowns:
             if not (0.0 < u.spread < np.inf and 0.0 < abs(u.apart) < np.inf and u.lower < u.upper):
-                raise InvalidInput(
-                    f"{u.parameter}: spread and step must be positive, lower below upper"
-                )
+                text = "spread and step must be positive, lower below upper"
+                raise InvalidInput(f"{u.parameter}: {text}")
+            if not abs(u.apart) < u.upper - u.lower:
+                text = f"twins {u.apart:g} apart, with limits of {u.lower:g} to {u.upper:g}"
+                raise InvalidInput(f"{u.parameter}: {text}; give a step within them")
         for channel, noise in self.channels.items():
             if not 0.0 < noise < np.inf:
                 raise InvalidInput(

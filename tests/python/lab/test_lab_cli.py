@@ -1,6 +1,7 @@
 """`sysid-vehicle lab run`."""
 
 import argparse
+import dataclasses
 import json
 import warnings
 from pathlib import Path
@@ -10,6 +11,8 @@ import pytest
 from sysid_vehicle import Log, example_vehicle, read_log
 from sysid_vehicle.cli import main
 from sysid_vehicle.cli.lab_logs import vehicle_of
+from sysid_vehicle.lab import GreyBoxVehicle
+from sysid_vehicle.lab.tyres.fit import NOISES, PARAMETERS
 
 
 def test_it_drives_previews_and_writes_all_that_was_asked_for(
@@ -100,3 +103,22 @@ def test_a_stiffness_that_no_tyre_has_is_refused_by_its_name(
     asked = ["lab", "em", str(tmp_path / "lap.csv"), "--vehicle", str(tmp_path / "car.toml")]
     assert main([*asked, "--stiffness", "15", "0"]) == 2
     assert "--stiffness 15 0: give two numbers above 0" in capsys.readouterr().err
+
+
+def test_validation_on_another_car_is_refused(
+    lap: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lap.to_csv(tmp_path / "lap.csv")
+    other = dataclasses.asdict(GreyBoxVehicle(400.0, 600.0, 1.25, 1.35))
+    tyres = [10.0, 1.4, 1.0, 0.0] * 2
+    values = [*tyres, 0.0, 0.0, 0.0, 1.0, 1.0, 0.5]
+    told = {
+        "vehicle": other,
+        "parameters": dict(zip(PARAMETERS, values, strict=True)),
+        "noise": dict.fromkeys(NOISES, 0.01),
+    }
+    (tmp_path / "tyres.json").write_text(json.dumps(told))
+    asked = ["lab", "validate", str(tmp_path / "lap.csv"), "--tyres", str(tmp_path / "tyres.json")]
+    assert main(asked) == 2
+    assert "lap: mass_kg = 400, but fx_n moves the car as if it had 12" in capsys.readouterr().err
+    assert main([*asked, "--unchecked"]) == 0

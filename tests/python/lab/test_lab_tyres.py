@@ -354,7 +354,7 @@ def test_reads_a_driving_log() -> None:
     assert same.measurements == pytest.approx(drive.measurements)
     (blind,) = TyreLog.from_log(as_log(drive, sideslip=False), CAR)
     assert not blind.sideslip_measured
-    # Without load columns: those at rest, and what braking moves forwards.
+    # Without loads those at rest, and what braking moves; without a force the acceleration.
     plain = {
         "time_s": drive.time_s,
         "vx_mps": drive.measurements[:, 0],
@@ -368,12 +368,13 @@ def test_reads_a_driving_log() -> None:
     moved = 780.0 * 2.0 * 0.3 / 3.0
     assert braked.inputs[0] == pytest.approx(
         [
-            -1560.0,
+            -2.0,
             drive.inputs[0, 1],
             780.0 * 9.80665 * 1.6 / 3.0 + moved,
             780.0 * 9.80665 * 1.4 / 3.0 - moved,
         ]
     )
+    assert (same.force_known, braked.force_known) == (True, False)
 
 
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle import lab
+from sysid_vehicle import lab, published
 from sysid_vehicle.errors import InvalidInput
 
 N = 300
@@ -63,3 +63,53 @@ def test_a_lorry_holds_its_speed() -> None:
     assert np.abs(loop.truth["vx_mps"] - 16.0).max() < 1.5  # 3.2 rms before
     light = lab.Setup.of(sv.Model(car.replace(mass_kg=900.0)))
     assert light.force == lab.Setup.default().force
+
+
+def test_a_drive_that_no_memory_holds_is_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"duration_s = 1e\+09: 1e\+11 samples at 100 Hz"):
+        lab.run_closed_loop(published.Identification(duration_s=1e9), lab.Setup.default(), seed=0)
+
+
+def test_a_seed_that_is_none_is_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"seed = -4: give a whole number, 0 or more"):
+        lab.identify_tyres(CAR, log(), starts=2, seed=-4)
+
+
+@pytest.mark.parametrize("horizon_s", [np.nan, np.inf, -1.0])
+def test_a_horizon_that_is_none_is_refused(horizon_s: float) -> None:
+    values = np.array([10.0, 1.4, 1.0, 0.0] * 2 + [0.0, 0.0, 0.0, 1.0, 1.0, 0.5])
+    car = lab.IdentifiedCar(CAR, values, np.full(7, 0.01))
+    with pytest.raises(InvalidInput, match=r"s ahead in a drive of 3 s.* choose a horizon"):
+        lab.validate_tyres(car, log(), horizon_s=horizon_s)
+
+
+@pytest.mark.parametrize("drag", [-5.0, np.nan, np.inf, 1e9])
+def test_a_drag_that_no_car_has_is_refused(drag: float) -> None:
+    with pytest.raises(InvalidInput, match=r"drag_nspm = .*give newtons per m/s"):
+        lab.ObserverCar.of(sv.example_vehicle(), drag_nspm=drag)
+
+
+def test_a_stiffness_in_newtons_per_radian_is_refused() -> None:
+    time_s = 0.01 * np.arange(600)
+    turn = 0.3 * np.sin(2.0 * time_s)
+    driven = sv.Log.from_arrays(
+        {
+            "time_s": time_s,
+            "vx_mps": 20.0 + 0.0 * turn,
+            "yaw_rate_radps": turn,
+            "ay_mps2": 20.0 * turn,
+            "ax_mps2": 0.0 * turn,
+            "steer_rad": 0.15 * turn,
+            "fx_n": 500.0 + 0.0 * turn,
+        },
+        check=False,
+    )
+    car = lab.ObserverCar.of(sv.example_vehicle())
+    with pytest.raises(InvalidInput, match=r"stiffness, rear = 90000: .*divided by the load"):
+        lab.ObserverRecord.from_log(driven, car, (15.0, 9e4))
+    record = lab.ObserverRecord.from_log(driven, car, (15.0, 20.0))
+    observer = lab.Observer(car, lab.ObserverNoise.first_guess(record, car))
+    with pytest.raises(InvalidInput, match=r"most_iterations = 0: give a whole number, 1 or more"):
+        lab.learn_observer_noise(observer, record, most_iterations=0)
+    with pytest.raises(InvalidInput, match=r"tolerance = nan: give a log-likelihood"):
+        lab.learn_observer_noise(observer, record, tolerance=np.nan)

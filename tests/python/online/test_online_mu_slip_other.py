@@ -34,6 +34,66 @@ def test_a_curve_that_fits_is_not_doubted() -> None:
     assert sum(doubted) == 0
 
 
+def braked(
+    seed: int, curve: online.MuSlipCurve = online.TWO_PARAMETER, peak: float = 0.9
+) -> online.MuSlipData:
+    """A wheel that an anti-lock brake lets slip to and fro."""
+    rng = np.random.default_rng(seed)
+    slip = np.abs(0.3 * np.sin(np.pi * 0.01 * np.arange(250) / 0.6))
+    mu = curve.mu(slip, [peak, 0.08, 1.6, 2.6][: len(curve.parameters)])
+    return online.MuSlipData(slip, mu + 0.03 * rng.standard_normal(slip.size), 0.03)
+
+
+@pytest.mark.parametrize("curve", [online.TWO_PARAMETER, online.MAGIC_FORMULA])
+@pytest.mark.parametrize("wheel", [-0.01, 0.01])
+def test_a_rolling_radius_told_wrong_is_named_and_not_another_curve(
+    curve: online.MuSlipCurve, wheel: float
+) -> None:
+    data = braked(11, curve)
+    slip = 1.0 - (1.0 - data.slip) * (1.0 + wheel)
+    found = online.compare_mu_slip(online.MuSlipData(slip, data.mu, 0.03), curve=curve)
+    assert abs(found.best.values[1] - 0.08) > 4.0 * found.best.std[1]
+    note = "slip: " + found.notes[-1].split("slip: ")[1]  # as likely as one of mu, or alone
+    assert note.startswith("slip: with an offset of")
+    assert "the rolling radius was told wrong by" in note
+    offset, std = map(float, note.split(" offset of ")[1].split(" the ")[0].split(" +- "))
+    assert abs(offset + wheel) < 4.0 * std < 0.003
+    peak, at = note.split(", with mu_peak ")[1].split(":")[0].split(", slip_peak ")
+    assert float(peak) == pytest.approx(0.9, abs=0.02)
+    assert float(at) == pytest.approx(0.08, abs=0.006)
+
+
+def test_a_force_that_is_none_of_the_tyre_is_named() -> None:
+    data = braked(12)
+    found = online.compare_mu_slip(online.MuSlipData(data.slip, data.mu + 0.06, 0.03))
+    assert abs(found.best.values[0] - 0.9) > 5.0 * found.best.std[0]
+    assert found.notes[-1].startswith("mu: with an offset of 0.0")
+    assert "a slope of the road" in found.notes[-1]
+
+
+@pytest.mark.parametrize("told", [0.03, None])
+def test_a_road_that_changes_on_the_way_is_named(told: float | None) -> None:
+    one, two = braked(13), braked(14, peak=0.5)
+    both = online.MuSlipData(np.r_[one.slip, two.slip], np.r_[one.mu, two.mu], told)
+    (note,) = online.compare_mu_slip(both).notes
+    assert "depends on the order of the readings" in note
+    assert "the road changed on the way" in note
+
+
+@pytest.mark.parametrize(("factor", "word"), [(0.1, "small"), (10.0, "large")])
+def test_noise_told_wrong_is_named(factor: float, word: str) -> None:
+    data = braked(15)
+    (note,) = online.compare_mu_slip(online.MuSlipData(data.slip, data.mu, 0.03 * factor)).notes
+    assert f"times too {word}; leave it out, and it is learnt" in note
+    assert online.compare_mu_slip(online.MuSlipData(data.slip, data.mu)).notes == ()
+
+
+def test_readings_as_told_raise_no_doubt() -> None:
+    """Five tests at 1e-3 each: 1 of 200 sets, by chance."""
+    doubted = [bool(online.compare_mu_slip(braked(seed)).notes) for seed in range(100, 160)]
+    assert sum(doubted) <= 2
+
+
 def test_the_table_says_what_rests_at_a_bound() -> None:
     assert "0.60000 at its bound" in str(online.compare_mu_slip(burckhardt(9)))
 

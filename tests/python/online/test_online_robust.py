@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
+from sysid_vehicle import published
 from sysid_vehicle.online import (
     KINDS,
     CorneringRls,
@@ -310,3 +311,19 @@ def test_a_slower_speed_is_no_sensor_that_is_missing(vehicle, log):
     lost = estimate_sideslip(vehicle, log)
     assert (lost.mode[1000:1100] == 2).all()
     assert "% of samples with a sensor missing or refused" in str(lost)
+
+
+@pytest.mark.parametrize("kind", ["dual", "ukf"])
+def test_a_log_without_longitudinal_acceleration_is_estimated_with_a_warning(vehicle, kind):
+    drive = sv.drive(sv.Model(vehicle), sv.manoeuvres.lap(40.0), seed=995051)
+    columns = {name: drive[name] for name in drive.channels if name != "ax_mps2"}
+    blind = sv.Log.from_arrays(columns, name="blind")
+    with pytest.warns(sv.SysidWarning, match=r"blind: there is no channel 'ax_mps2'.* record it"):
+        found = estimate_sideslip(vehicle, blind, kind=kind)
+    whole = estimate_sideslip(vehicle, drive, kind=kind)
+    assert found.error().rms_deg < 1.5 * whole.error().rms_deg
+    assert found.error().covered > 0.9
+    assert np.mean(found.mode == 2) < 0.01
+    assert found.used_friction == pytest.approx(whole.used_friction, rel=0.1)
+    with pytest.raises(sv.InvalidInput, match="there is no channel 'ax_mps2'"):
+        published.estimate_sideslip(vehicle, blind)

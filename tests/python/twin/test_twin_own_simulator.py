@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid_vehicle.errors import SysidWarning
+from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.twin import (
     CallableTwin,
     Observation,
@@ -159,3 +159,20 @@ def test_forces_that_names_do_not_tell_are_warned_of() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             found(short, few, twin(1500.0, 2400.0, ("F", "delta")), **doubt)
+
+
+def test_an_estimate_that_noise_takes_off_its_limit_stands_there() -> None:
+    """The last value was below the limit by a few kilograms, and nothing was said."""
+    inputs, read = driven(733340)
+    heavy = Unknown("mass_kg", 250.0, 10.0, 1000.0, 1600.0)
+    observer = Observer(batch=SideBySide([heavy], {"ax_mps2": 0.08}))
+    with pytest.warns(SysidWarning, match=r"mass_kg = 15\d\d\S* stands at its limit, 1600"):
+        run = observe_with(twin(1500.0, INERTIA_KGM2), inputs, read, observer)
+    assert run.parameters["mass_kg"][-1] < 1600.0
+
+
+def test_twins_beyond_the_limits_are_refused() -> None:
+    """They taught nothing: the mass stayed where it began."""
+    far = Unknown("mass_kg", 250.0, 1e6, 700.0, 3000.0)
+    with pytest.raises(InvalidInput, match=r"mass_kg: twins 1e\+06 apart, with limits of 700"):
+        SideBySide([far], {"ax_mps2": 0.08})

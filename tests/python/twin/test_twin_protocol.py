@@ -328,8 +328,34 @@ def test_what_an_fmu_lacks_is_said(unit: Path, tmp_path: Path) -> None:
         made(states=("a", "b"))
     with pytest.raises(InvalidInput, match="no such file"):
         FMUTwin(tmp_path / "none.fmu", VARIABLES)
+    with pytest.raises(InvalidInput, match="start of 'v' is nan; give a number"):
+        made(start={"v": float("nan")})
+    with pytest.raises(InvalidInput, match=r"dt_s = 0\.0; give seconds"):
+        FMUTwin(unit, VARIABLES, dt_s=0.0)
     started = made(start={"v": 3.0})
     assert started.outputs(np.array([0.0]))[0] == 3.0
+
+
+@pytest.mark.parametrize("inside", [None, {}, {"modelDescription.xml": "<fmi"}])
+def test_a_file_that_is_no_fmu_is_named(tmp_path: Path, inside: dict[str, str] | None) -> None:
+    path = tmp_path / "car.fmu"
+    path.write_text("no archive")
+    if inside is not None:
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, text in inside.items():
+                archive.writestr(name, text)
+    with pytest.raises(InvalidInput, match=r"car\.fmu: is no FMU that can be read .* export"):
+        FMUTwin(path, VARIABLES)
+
+
+def test_an_fmu_for_another_machine_is_named(unit: Path, tmp_path: Path) -> None:
+    path = tmp_path / "car.fmu"
+    with zipfile.ZipFile(unit) as given, zipfile.ZipFile(path, "w") as archive:
+        for name in given.namelist():
+            if not name.startswith("binaries"):
+                archive.writestr(name, given.read(name))
+    with pytest.raises(InvalidInput, match=r"car\.fmu: the FMU cannot be loaded .* a library for"):
+        FMUTwin(path, VARIABLES)
 
 
 def test_an_fmu_leaves_no_folder_behind(unit: Path) -> None:

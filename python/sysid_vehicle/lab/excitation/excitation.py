@@ -21,8 +21,16 @@ if TYPE_CHECKING:
     from ..setup import Setup
 
 
+_MOST_SAMPLES = 5_000_000  # of a drive; all its columns take some GB
+
+
 def sample_times(duration_s: float, rate_hz: float) -> FloatArray:
     """Sample times from 0 to the end, both included."""
+    if not duration_s * rate_hz < _MOST_SAMPLES:
+        raise InvalidInput(
+            f"duration_s = {duration_s:g}: {duration_s * rate_hz:.3g} samples at {rate_hz:g} Hz do "
+            f"not fit; give less than {_MOST_SAMPLES / rate_hz:g} s"
+        )
     return np.arange(round(duration_s * rate_hz) + 1) / rate_hz
 
 

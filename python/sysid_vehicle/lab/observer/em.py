@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
+from ..._common.arguments import whole
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.printed import Part, Printed, Table
 from ..._common.progress import doing
@@ -289,14 +290,17 @@ def learn_observer_noise(
     Raises
     ------
     InvalidInput
-        No record, too few readings, a structure that contradicts itself, or a start it cannot
-        leave.
+        No record, no iteration, too few readings, a structure that contradicts itself, or a start
+        it cannot leave.
     NumericalError
         The filter broke down.
     """
     several = (records,) if isinstance(records, ObserverRecord) else tuple(records)
     if not several:
         raise InvalidInput("no record was given; pass one ObserverRecord or a list of them")
+    most = whole(most_iterations, "most_iterations", 1)
+    if not 0.0 <= tolerance < np.inf:
+        raise InvalidInput(f"tolerance = {tolerance}: give a log-likelihood of 0 or more")
     process_form = (process or NoiseStructure()).core(STATES)
     sensor_form = (sensors or NoiseStructure()).core(READINGS)
     _refuse_too_little(several)
@@ -309,7 +313,7 @@ def learn_observer_noise(
             as_float64(observer.noise.sensors),
             *process_form,
             *sensor_form,
-            int(most_iterations),
+            most,
             float(tolerance),
             never_fall,
             accelerate,

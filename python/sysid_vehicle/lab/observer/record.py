@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +13,11 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput
 from ...log import Log
-from ...vehicle import Vehicle, static_loads
+from ...tyre import TYRE_RANGES
+from ...vehicle import AXLES, Vehicle, static_loads
 from .observed import READINGS, refuse
+
+_STIFFEST = math.prod(TYRE_RANGES[letter].high for letter in "BCD")  # per load [1/rad]
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,11 @@ class ObserverCar:
         for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m"):
             if not getattr(self, name) > 0.0:
                 raise InvalidInput(f"{name} = {getattr(self, name)} must be a number above zero")
+        if not 0.0 <= self.drag_nspm < self.mass_kg:  # that much would stop it within a second
+            raise InvalidInput(
+                f"drag_nspm = {self.drag_nspm}: give newtons per m/s, from 0 to below the "
+                f"{self.mass_kg:g} that would stop the car within a second; cars have 10 to 50"
+            )
 
     @classmethod
     @typed
@@ -163,12 +172,19 @@ class ObserverRecord:
         Raises
         ------
         InvalidInput
-            No wheel force in the log, or what `from_arrays` refuses.
+            No wheel force in the log, a stiffness that is none per load, or what `from_arrays`
+            refuses.
         """
         if not log.has("fx_n"):
             raise InvalidInput(
                 f"{log.name}: no fx_n; the observer needs the wheel force, add that column"
             )
+        for axle, value in zip(AXLES, stiffness_prad, strict=True):
+            if not 0.0 < value <= _STIFFEST:
+                raise InvalidInput(
+                    f"cornering stiffness, {axle} = {value:g}: give that per axle load in 1/rad; "
+                    "cars have 8 to 30, and newtons per radian are to be divided by the load"
+                )
         missing = np.full(log.n, np.nan)
         loads = [
             log[name] if log.has(name) else np.full(log.n, at_rest)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -113,9 +113,17 @@ class TyreLog:
         v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]; NaN where missing. v_y may be missing
         throughout.
     inputs : array, shape (n, 4)
-        Longitudinal force [N], road-wheel angle [rad], axle loads front and rear [N], each held
-        from its sample to the next.
+        Longitudinal force [N], or acceleration [m/s2] if `force_known` is false; road-wheel angle
+        [rad], axle loads front and rear [N].
     name : str
+    inputs_held : bool, optional
+        Whether each input is held from its sample to the next, as a digital controller holds it,
+        or goes there in a straight line, as a driver turns the wheel. If left out, the likelihood
+        of all logs together decides.
+    force_known : bool
+        Whether the first input is the force of the wheels. Otherwise it is the acceleration that
+        was measured, which drag and the side force of turned wheels are in already: then no drag
+        is identified.
 
     Raises
     ------
@@ -128,6 +136,8 @@ class TyreLog:
     measurements: FloatArray
     inputs: FloatArray
     name: str = "log"
+    inputs_held: bool | None = None
+    force_known: bool = True
 
     @typed_fields
     def __post_init__(self) -> None:
@@ -177,8 +187,9 @@ class TyreLog:
         *,
         load_delay_samples: int = 0,
         name: str = "log",
+        inputs_held: bool | None = True,
     ) -> TyreLog:
-        """From arrays as a simulation logs them.
+        """From arrays as a simulation logs them, with inputs that a controller holds.
 
         Parameters
         ----------
@@ -191,6 +202,8 @@ class TyreLog:
         load_delay_samples : int
             Samples by which the loads act later than they are logged.
         name : str
+        inputs_held : bool, optional
+            As in `TyreLog`.
         """
         u, f = as_float64(force_and_steer), as_float64(loads)
         for what, a in (("force_and_steer", u), ("loads", f)):
@@ -203,16 +216,18 @@ class TyreLog:
             )
         if load_delay_samples > 0:
             f = np.vstack([np.repeat(f[:1], load_delay_samples, axis=0), f[:-load_delay_samples]])
-        return cls(step_s, as_float64(measurements), as_float64(np.column_stack([u, f])), name)
+        inputs = as_float64(np.column_stack([u, f]))
+        return cls(step_s, as_float64(measurements), inputs, name, inputs_held)
 
     @classmethod
     @typed
     def from_log(cls, log: Log, vehicle: GreyBoxVehicle) -> tuple[TyreLog, ...]:
         """From a driving log: one for each stretch in which the car drives, its inputs known.
 
-        Axle loads are the columns ``fz_front_n`` and ``fz_rear_n`` where the log has them, else
-        those at rest with what the height of the centre of gravity and the longitudinal
-        acceleration move between them.
+        Where the log has no wheel force, the longitudinal acceleration stands for it. Axle loads
+        are the columns ``fz_front_n`` and ``fz_rear_n`` where the log has them, else those at rest
+        with what the height of the centre of gravity and the longitudinal acceleration move
+        between them.
 
         Raises
         ------
@@ -220,7 +235,8 @@ class TyreLog:
             No stretch is long enough.
         """
         a_x = log["ax_mps2"] if log.has("ax_mps2") else np.zeros(log.n)
-        force = log["fx_n"] if log.has("fx_n") else vehicle.mass_kg * a_x
+        known = log.has("fx_n")
+        along = log["fx_n"] if known else a_x
         v_y = log["vy_mps"] if log.has("vy_mps") else np.full(log.n, np.nan)
         if log.has("fz_front_n") and log.has("fz_rear_n"):
             loads = [np.maximum(log[n], 0.0) for n in ("fz_front_n", "fz_rear_n")]
@@ -230,7 +246,7 @@ class TyreLog:
             front, rear = static_loads(vehicle.mass_kg, vehicle.lf_m, vehicle.lr_m)
             loads = [np.maximum(front - shift, 0.0), np.maximum(rear + shift, 0.0)]
         y = np.column_stack([log["vx_mps"], v_y, log["yaw_rate_radps"], log["ay_mps2"]])
-        u = np.column_stack([force, log["steer_rad"], *loads])
+        u = np.column_stack([along, log["steer_rad"], *loads])
         # A car at walking pace tells nothing of its tyres, and its slip angles are ill-defined.
         parts = [s for s in log.stretches() if s.stop - s.start >= SHORTEST]
         if not parts:
@@ -241,7 +257,7 @@ class TyreLog:
         step = 1.0 / log.rate_hz
         several = len(parts) > 1
         return tuple(
-            cls(step, as_float64(y[s]), as_float64(u[s]), _part(log.name, i, several))
+            cls(step, y[s], u[s], _part(log.name, i, several), force_known=known)
             for i, s in enumerate(parts, 1)
         )
 
@@ -264,7 +280,7 @@ class TyreLog:
         """The same drive without its v_y."""
         y = self.measurements.copy()
         y[:, 1] = np.nan
-        return TyreLog(self.step_s, y, self.inputs, self.name)
+        return replace(self, measurements=y)
 
     @typed
     def with_kinematic_sideslip(self, window_s: float = 10.0) -> TyreLog:
@@ -279,13 +295,13 @@ class TyreLog:
         window = np.ones(2 * half + 1)
         drift = np.convolve(v_y, window, "same") / np.convolve(np.ones(self.n), window, "same")
         y[:, 1] = v_y - drift
-        return TyreLog(self.step_s, y, self.inputs, self.name)
+        return replace(self, measurements=y)
 
     @typed
     def cut(self, first: int, last: int) -> TyreLog:
         """Samples `first` up to, not including, `last`."""
-        return TyreLog(
-            self.step_s, self.measurements[first:last], self.inputs[first:last], self.name
+        return replace(
+            self, measurements=self.measurements[first:last], inputs=self.inputs[first:last]
         )
 
     def __str__(self) -> str:

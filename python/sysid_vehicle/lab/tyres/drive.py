@@ -65,4 +65,4 @@ def drive_tyres(
             f"{READINGS[0]} {y[k, 0]:.3g}, {READINGS[1]} {y[k, 1]:.3g}); steer or brake less"
         )
     noise = generator(seed).normal(size=y.shape) * np.asarray(sensors)
-    return TyreLog(step_s, as_float64(y + noise), u, name)
+    return TyreLog(step_s, as_float64(y + noise), u, name, inputs_held=True)

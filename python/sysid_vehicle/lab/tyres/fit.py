@@ -219,10 +219,16 @@ class TyreFit(Estimated, Printed):
         low, high = self.interval(name)
         return max(high - self[name].value, self[name].value - low)
 
+    @property
+    def inputs_held(self) -> bool:
+        """Whether inputs are held from sample to sample, as told or as the likelihood prefers."""
+        return all(log.inputs_held is not False for log in self.logs)
+
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
         return {
             "logs": [str(log) for log in self.logs],
+            "inputs_held": self.inputs_held,
             "vehicle": asdict(self.vehicle),
             "parameters": dict(zip(PARAMETERS, map(float, self.parameters), strict=True)),
             "log_likelihood": self.log_likelihood,
@@ -304,10 +310,12 @@ class TyreFit(Estimated, Printed):
         return f"{low} .. {high}"
 
     def _headline(self) -> str:
+        inputs = "held until the next" if self.inputs_held else "straight to the next"
         return (
             f"Tyres from {'; '.join(map(str, self.logs))}\n"
             # The starts have the likelihood of the thinned data that decided between them.
-            f"log-likelihood {self.log_likelihood:.1f}; {self.starts.agreement}"
+            f"log-likelihood {self.log_likelihood:.1f}; {self.starts.agreement}; steering and "
+            f"forces of each sample {inputs}"
         )
 
     def _closing(self) -> str:

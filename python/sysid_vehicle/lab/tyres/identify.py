@@ -80,15 +80,17 @@ def identify_tyres(
     Raises
     ------
     InvalidInput
-        No log, an unknown method or parameter, less than one start.
+        No log, an unknown method or parameter, less than one start, a negative seed, inputs of two
+        kinds, a wheel force in some logs only.
     NumericalError
         No start led anywhere.
     """
     several = (logs,) if isinstance(logs, TyreLog) else tuple(logs)
-    _check(several, method, starts)
+    _check(several, method, starts, seed)
     _check_loads(several, vehicle)
-    free = free_parameters(vehicle, residual_terms=residual_terms)
-    p = first_point(start or {})
+    known = several[0].force_known
+    free = free_parameters(vehicle, residual_terms=residual_terms, force_known=known)
+    p = first_point({**(start or {}), **({} if known else {"drag_area_m2": 0.0})})
     box = box_of(free, {})
     given = np.clip(p[box.columns], box.lower, box.upper)
     begins = space_filling(given, box.lower, box.upper, starts, seed, list(range(8)))
@@ -107,6 +109,9 @@ def identify_tyres(
     ends, values, noise, rivals = alternate(thin, ends, values, noise, runner, method=method)
     table = Starts(free, begins, as_float64(ends[:, box.columns]), values)
     p = ends[int(np.argmax(values))]
+    several, p, noise = _between_samples(
+        vehicle, several, p, noise, box, residual_terms=residual_terms, method=method
+    )
     whole = objective_of(vehicle, several, residual_terms=residual_terms)
     for left in reversed(range(BETTER_FOUND)):
         passed, noise, _ = settle(whole, p, noise, box, method=method, parameters_first=True)
@@ -126,6 +131,33 @@ def identify_tyres(
             break
         p = better
     return fit
+
+
+def _between_samples(
+    vehicle: GreyBoxVehicle,
+    logs: tuple[TyreLog, ...],
+    p: FloatArray,
+    noise: FloatArray,
+    box: Box,
+    *,
+    residual_terms: bool,
+    method: str,
+) -> tuple[tuple[TyreLog, ...], FloatArray, FloatArray]:
+    """Logs of which it is said what inputs do between samples: what the likelihood prefers.
+
+    Held inputs act half a sample later than those that move. Where the car answers within some
+    samples the wrong choice is taken for another stiffness.
+    """
+    told = {log.inputs_held for log in logs} - {None}
+    if len(told) == 1:
+        return tuple(replace(log, inputs_held=told.copy().pop()) for log in logs), p, noise
+    found = []
+    for held in (True, False):
+        chosen = tuple(replace(log, inputs_held=held) for log in logs)
+        thin = objective_of(vehicle, chosen, _THINNED, residual_terms=residual_terms)
+        there, its, _ = settle(thin, p, noise, box, method=method, parameters_first=True)
+        found.append((thin.log_likelihood(there, its), chosen, there, its))
+    return max(found, key=lambda one: one[0])[1:]
 
 
 def _summary(
@@ -212,12 +244,25 @@ def _check_loads(logs: Sequence[TyreLog], vehicle: GreyBoxVehicle) -> None:
             )
 
 
-def _check(logs: tuple[TyreLog, ...], method: str, starts: int) -> None:
+def _check(logs: tuple[TyreLog, ...], method: str, starts: int, seed: int) -> None:
     if not logs:
         raise InvalidInput("no log was given; pass one TyreLog or a list of them")
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
     whole(starts, "starts", 1)
+    whole(seed, "seed")
+    if len({log.inputs_held for log in logs} - {None}) > 1:
+        held = next(log.name for log in logs if log.inputs_held)
+        raise InvalidInput(
+            f"{held}: inputs_held is True, of other logs False; identify from logs of one kind, or "
+            "leave it out"
+        )
+    if len({log.force_known for log in logs}) > 1:
+        without = next(log.name for log in logs if not log.force_known)
+        raise InvalidInput(
+            f"{without}: no wheel force (fx_n), which other logs have; identify from logs of one "
+            "kind, or leave fx_n out of all"
+        )
     blind = [log.name for log in logs if not log.sideslip_measured]
     if blind:
         warn(

@@ -1,8 +1,9 @@
 """What is asked of the data: free parameters, where they are looked for, and the likelihood.
 
-The likelihood is that of the main job, of a model whose inputs are held from sample to sample and
-whose axle loads are logged. Factors of mass and yaw inertia and the drag are effects of it, P1, P2
-and P3 an effect of its own: a lateral force m (P1 v_x^2 + P2 v_y + P3 r) of the stated mass.
+The likelihood is that of the main job, of a model whose axle loads are logged and whose inputs are
+held from sample to sample where a digital controller gave them. Factors of mass and yaw inertia and
+the drag are effects of it, P1, P2 and P3 an effect of its own: a lateral force
+m (P1 v_x^2 + P2 v_y + P3 r) of the stated mass.
 """
 
 from __future__ import annotations
@@ -100,10 +101,16 @@ def _tolerances(vehicle: GreyBoxVehicle) -> dict[str, float]:
     return {name: tolerance for name, tolerance in stated.items() if tolerance > 0.0}
 
 
-def free_parameters(vehicle: GreyBoxVehicle, *, residual_terms: bool = False) -> tuple[str, ...]:
-    """Names of what is identified: both tyres, what the vehicle is not sure of, the drag."""
+def free_parameters(
+    vehicle: GreyBoxVehicle, *, residual_terms: bool = False, force_known: bool = True
+) -> tuple[str, ...]:
+    """Names of what is identified: both tyres, what the vehicle is not sure of, the drag.
+
+    A measured acceleration has the drag in it, which then is none of them.
+    """
     terms = ("P1", "P2", "P3") if residual_terms else ()
-    return (*PARAMETERS[:8], *terms, *_tolerances(vehicle), "drag_area_m2")
+    drag = ("drag_area_m2",) if force_known else ()
+    return (*PARAMETERS[:8], *terms, *_tolerances(vehicle), *drag)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +127,14 @@ class TyreProblem:
     yaw_inertia_kgm2: float
 
     @classmethod
-    def of(cls, vehicle: GreyBoxVehicle, *, residual_terms: bool) -> TyreProblem:
+    def of(
+        cls,
+        vehicle: GreyBoxVehicle,
+        *,
+        residual_terms: bool,
+        inputs_held: bool = True,
+        force_known: bool = True,
+    ) -> TyreProblem:
         """Without runs; P1, P2, P3 act only in a problem with `residual_terms`."""
         terms = trace(
             lambda d, p: vehicle.mass_kg * (p.P1 * d.v_x**2 + p.P2 * d.v_y + p.P3 * d.r),
@@ -133,7 +147,7 @@ class TyreProblem:
             mask |= effect(name).bit
         own: tuple[Any, ...] = (0, [], ((TARGETS.index("force_y"), terms.steps),), [])
         users = [own] if residual_terms else []
-        model = _core.SingleTrack(vehicle.core(), mask, True, users, True, True)
+        model = _core.SingleTrack(vehicle.core(), mask, force_known, users, True, inputs_held)
         return cls(_core.Problem(model), vehicle.yaw_inertia_kgm2)
 
     def add_run(self, step_s: float, inputs: FloatArray, measurements: FloatArray) -> None:
@@ -229,9 +243,15 @@ def tyre_problem(
     """The likelihood of logs; of about so many samples, if that is asked.
 
     Half of those are the windows of the hardest cornering, where tyres show their peak, half are
-    spread evenly over the rest.
+    spread evenly over the rest. Inputs of which nothing is said are taken as held.
     """
-    problem = TyreProblem.of(vehicle, residual_terms=residual_terms)
+    held = all(log.inputs_held is not False for log in logs)
+    problem = TyreProblem.of(
+        vehicle,
+        residual_terms=residual_terms,
+        inputs_held=held,
+        force_known=all(log.force_known for log in logs),
+    )
     total = sum(log.n for log in logs)
     for log in logs:
         windows = [slice(0, log.n)]

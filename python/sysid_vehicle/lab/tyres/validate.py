@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from ...errors import InvalidInput
 from ..observer.observed import READINGS
 from .data import GreyBoxVehicle, TyreLog
 from .fit import NOISES, PARAMETERS, TyreFit
-from .problem import tyre_problem
+from .problem import TyreProblem, tyre_problem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -203,16 +203,30 @@ def validate_tyres(
 
 
 def _validation(car: IdentifiedCar, log: TyreLog, horizon_s: float) -> Validation:
-    ahead = round(horizon_s / log.step_s)
+    ahead = round(horizon_s / log.step_s) if np.isfinite(horizon_s) else 0
     if not 1 < ahead < log.n:
         raise InvalidInput(
             f"{log.name}: {horizon_s:g} s ahead in a drive of {log.n * log.step_s:g} s, sampled "
             f"every {log.step_s:g} s; choose a horizon in between"
         )
-    problem = tyre_problem(car.vehicle, [log], residual_terms=bool(np.any(car.parameters[8:11])))
+    problem = _problem(car, log)
     near = [problem.predicted(car.parameters, car.noise, n) for n in (1, ahead)]
     whole = problem.free_run(car.parameters)
     whole[0] = np.nan  # it begins with these readings, and with their noise
     predicted = np.stack([*near, whole])
     horizons = ("one sample", f"{horizon_s:g} s", "the whole drive")
     return Validation(log, horizons, predicted, as_float64(car.noise[: len(READINGS)]))
+
+
+def _problem(car: IdentifiedCar, log: TyreLog) -> TyreProblem:
+    """The log's likelihood; where inputs may be held or not, the larger one of both."""
+    kinds = (True, False) if log.inputs_held is None else (log.inputs_held,)
+    terms = bool(np.any(car.parameters[8:11]))
+    problems = [
+        tyre_problem(car.vehicle, [replace(log, inputs_held=held)], residual_terms=terms)
+        for held in kinds
+    ]
+    if len(problems) == 1:
+        return problems[0]
+    p = car.parameters[None, :]
+    return max(problems, key=lambda one: float(one.log_likelihoods(p, car.noise)[0]))

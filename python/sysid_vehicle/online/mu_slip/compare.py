@@ -11,8 +11,9 @@ from ..._common.text import text_table
 from ...errors import InvalidInput
 from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
 from .data import MuSlipData
+from .doubts import doubts
 from .filter import mu_slip_ekf, mu_slip_smooth
-from .least_squares import counted, misfit, mu_slip_fit, noise_of
+from .least_squares import counted, mu_slip_fit, noise_of
 from .results import MuSlipEstimate
 
 _ITERATIONS = 10
@@ -29,7 +30,7 @@ class MuSlipComparison(Told):
     estimates : tuple of MuSlipEstimate
         One per estimator, the recommended one last.
     notes : tuple of str
-        Which estimators failed, and whether the curve fits the readings.
+        Which estimators failed, and what the readings say against curve, offsets and noise told.
     """
 
     data: MuSlipData
@@ -57,7 +58,15 @@ def compare_mu_slip(data: MuSlipData, *, curve: MuSlipCurve = TWO_PARAMETER) -> 
     for the Magic Formula the iterated smoother, whose prior holds shape and slope where the
     readings say little of them.
     """
-    data = replace(data, noise_std=noise_of(data, curve))
+    told = replace(data, noise_std=noise_of(data, curve))
+    found, notes = every_estimate(told, curve)
+    return MuSlipComparison(told, found, (*notes, *doubts(data, found[-1])))
+
+
+def every_estimate(
+    data: MuSlipData, curve: MuSlipCurve
+) -> tuple[tuple[MuSlipEstimate, ...], list[str]]:
+    """Estimates of readings whose noise is known, and which estimators failed."""
     found = [
         mu_slip_ekf(data, curve=curve).estimate,
         mu_slip_ekf(data, curve=curve, passes=2).estimate,
@@ -86,5 +95,4 @@ def compare_mu_slip(data: MuSlipData, *, curve: MuSlipCurve = TWO_PARAMETER) -> 
         found.append(smoothed)
         fit("least squares")
         fit("least squares, corrected", corrected=True)
-    notes += misfit(data, found[-1])
-    return MuSlipComparison(data, tuple(found), tuple(notes))
+    return tuple(found), notes

@@ -13,13 +13,11 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import HALF_95
 from ..._common.typed import typed
 from ...errors import InvalidInput
-from ...rules import USUAL
-from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
+from .curve import TWO_PARAMETER, MuSlipCurve
 from .data import MuSlipData, at_least_one, check_noise, check_values
 from .results import MuSlipEstimate, cautions, resting
 
 _ROUNDS = 100  # of a fit with one parameter held
-_FEWEST = 20  # readings that the normal distribution of the ratio takes
 
 
 @typed
@@ -183,32 +181,6 @@ def noise_of(data: MuSlipData, curve: MuSlipCurve) -> float:
             "noise_std: cannot be learnt, the curve goes through all readings; give its value"
         )
     return std
-
-
-def misfit(data: MuSlipData, found: MuSlipEstimate) -> list[str]:
-    """Say that what a curve leaves depends on the slip, where it does.
-
-    By J. von Neumann's ratio, Ann. Math. Statist. 12 (1941), p. 367: neighbours in slip differ by
-    less than readings with white noise do.
-    """
-    error = data.mu - found.curve.mu(data.slip, found.values)
-    there = np.isfinite(error)
-    left = error[there][np.argsort(data.slip[there], kind="stable")]
-    n, total = left.size, float(left @ left)
-    if n < _FEWEST or total == 0.0:
-        return []
-    ratio = float(np.sum(np.diff(left) ** 2)) / total
-    below = (2.0 - ratio) / (2.0 * math.sqrt((n - 2.0) / (n**2 - 1.0)))
-    p_value = 0.5 * math.erfc(below / math.sqrt(2.0))
-    if p_value >= USUAL.strict:
-        return []
-    others = [c.name for c in (TWO_PARAMETER, MAGIC_FORMULA) if c is not found.curve]
-    note = (
-        f"the {found.curve.name} curve does not fit: what it leaves depends on the slip "
-        f"(p = {p_value:.2g}), so values may be off by more than their standard "
-        f"deviation; try the {others[0]} curve, or, where noise is not white, filter less"
-    )
-    return [note]
 
 
 def counted(iterations: int) -> str:

@@ -17,7 +17,7 @@ from ..._common.style import FLOOR, axes_or_new, tidy
 from ..._common.text import text_table
 from ..._common.typed import typed
 from ...errors import InvalidInput
-from .compare import compare_mu_slip
+from .compare import every_estimate
 from .curve import TWO_PARAMETER, MuSlipCurve
 from .data import check_noise, simulate_mu_slip
 from .least_squares import mu_slip_cramer_rao
@@ -206,7 +206,7 @@ def mu_slip_over_noise(
             data = simulate_mu_slip(
                 list(truth), curve=curve, noise_std=float(level), slip=clean.slip, seed=int(draw)
             )
-            found = compare_mu_slip(data, curve=curve).estimates
+            found, _ = every_estimate(data, curve)
             for estimate in found:
                 table = errors.setdefault(estimate.method, np.full((levels.size, sets, 2), np.nan))
                 table[i, j] = estimate.values[:2] - truth[:2]
