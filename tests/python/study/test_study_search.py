@@ -162,6 +162,8 @@ def test_without_what_did_harm_the_search_goes_on(
 
     def follow(looking: Search, trail: Trail) -> None:
         asked.append(tuple(map(str, looking.candidates)))
+        assert trail.full == trail.stopped == ()
+        trail.full = ("mass",)
         assert len(trail.diagnoses) == len(trail.fits) - 1
         trail.fits.append(steps.pop(0))
         trail.diagnoses += [dx, replace(dx, fit=trail.fit)]
@@ -175,7 +177,8 @@ def test_without_what_did_harm_the_search_goes_on(
     monkeypatch.setattr(Search, "follow", follow)
     monkeypatch.setattr(Search, "take_out_harmful", without)
     trail = Trail([baseline])
-    replace(search(baseline, 2), ends=ends).settle(trail)
+    begun = replace(search(baseline, 2), ends=ends, finer=refining())
+    begun.settle(trail)
     less = tuple(e for e in AGAINST if e != "head_wind")
     assert asked == ([tuple(AGAINST), less] if ends else [tuple(AGAINST)])
     assert trail.fit is (good if ends else baseline)

@@ -80,9 +80,13 @@ class Search:
             trail.without_harm(self.test, self.rules)
             if not self.take_out_harmful(trail) or time.perf_counter() > self.ends:
                 return
-            left = [c for c in self.candidates if getattr(c, "id", c) not in trail.harmful]
-            search = replace(self, candidates=left)
+            search = replace(
+                self,
+                candidates=[c for c in self.candidates if _name(c) not in trail.harmful],
+                finer=[e for e in self.finer if e.id not in trail.harmful],
+            )
             trail.diagnoses.pop()  # `follow` asks anew, with refits
+            trail.stopped, trail.full = (), ()
 
     def follow(self, trail: Trail) -> None:
         """Add what is missing to the last model until nothing more is that the driving can show."""
@@ -250,3 +254,7 @@ class Search:
             seed=self.seed,
             progress=self.progress,
         )
+
+
+def _name(candidate: str | Effect) -> str:
+    return candidate if isinstance(candidate, str) else candidate.id
