@@ -96,8 +96,7 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
     errors are smaller than those of the true car. Its likelihood is not, unless its noise grew.
     Whatever speaks for an effect, predictions some seconds ahead must not become worse. Where they
     err more in the mean, however surely, the error that falls is the one of a single step alone:
-    then it speaks for nothing that has to be shown less clearly. Beside a likelihood that decides
-    alone what a channel only leans to is no veto, and what it shows clearly is.
+    then it speaks for nothing that has to be shown less clearly.
     """
     three = (measures.gain, measures.own_gain, measures.fall)
     falls = measures.fall.value > 0.0
@@ -106,7 +105,7 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
     own = measures.own_gain
     sure = own.value > rules.sure * own.error and measures.plausible and measures.as_sure
     confirmed = (speak and (falls or measures.plausible)) or sure
-    return confirmed and not worse(measures.changes, rules, leaning=not sure)
+    return confirmed and not worse(measures.changes, rules)
 
 
 def _grows(changes: Sequence[ErrorChange], rules: Rules) -> bool:
@@ -115,23 +114,19 @@ def _grows(changes: Sequence[ErrorChange], rules: Rules) -> bool:
     return mean > math.log1p(rules.worse)
 
 
-def worse(
-    changes: Sequence[ErrorChange], rules: Rules = USUAL, *, leaning: bool = True
-) -> tuple[ErrorChange, ...]:
+def worse(changes: Sequence[ErrorChange], rules: Rules = USUAL) -> tuple[ErrorChange, ...]:
     """The errors some seconds ahead that have grown, by more than it matters.
 
-    One horizon shows it clearly, were its channel one of as many that are asked, or, with
-    `leaning`, a channel leans to it in the mean over its horizons: errors of few blocks are known
-    so badly that what costs a channel a tenth is rarely clear. Horizons of a channel are nearly one
-    test, channels are not: of five that do not change one grows by two standard errors in every
-    eighth study.
+    One horizon shows it clearly, were its channel one of as many that are asked, or a channel leans
+    to it in the mean over its horizons: errors of few blocks are known so badly that what costs a
+    channel a tenth is rarely clear. Horizons of a channel are nearly one test, channels are not: of
+    five that do not change one grows by two standard errors in every eighth study.
     """
     least, clear = math.log1p(rules.worse), rules.interval_of(len({c.channel for c in changes}))
     lean = {
         channel
         for channel in {c.channel for c in changes}
-        if leaning
-        and _mean(changes, channel, "log_ratio")
+        if _mean(changes, channel, "log_ratio")
         > max(least, rules.lean * _mean(changes, channel, "error"))
     }
     return tuple(

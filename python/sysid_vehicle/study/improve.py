@@ -182,7 +182,9 @@ def improve(
                 progress=progress,
                 say=say,
             )
-            search.settle(found)
+            search.follow(found)
+            found.without_harm(test_driving, rules)
+            search.take_out_harmful(found)
             search.give_back(found)
         return found
 

@@ -29,8 +29,8 @@ from ..log import LEAST_USABLE_S, Log, copies, several_logs
 from ..rules import USUAL, ErrorChange, Gain, Rules
 from .ahead.beyond import Beyond, beyond_noise
 from .ahead.fitted_range import Bools, fitted, within_fitted_range
-from .ahead.horizons import ALONG, LATERAL, typical_error
-from .ahead.unmoved import along_alone, changes_of, lateral_alone
+from .ahead.horizons import ALONG, typical_error
+from .ahead.unmoved import along_alone, changes_of
 
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
@@ -167,15 +167,11 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> Gain:
     Both models are measured by the noise floor of the richer one: noise of its own can make a model
     likelier whose forces explain less than before. Where nothing but effects along the car tells
     the models apart its speed and acceleration along it count: lateral errors fall and grow with
-    tyres that were fitted anew. Where nothing but lateral effects does lateral errors count. The
-    error comes from pieces (`_with_error`). Where a model fails there is no fall.
+    tyres that were fitted anew. The error comes from pieces (`_with_error`). Where a model fails
+    there is no fall.
     """
     floor = richer.noise.floor().vector()
-    counted: tuple[str, ...] = MEASURED
-    if along_alone(poorer, richer):
-        counted = ALONG
-    elif lateral_alone(poorer, richer):
-        counted = LATERAL
+    counted = ALONG if along_alone(poorer, richer) else MEASURED
     columns = [MEASURED.index(c) for c in counted]
 
     def squares(fit: Fit) -> FloatArray:

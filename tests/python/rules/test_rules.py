@@ -270,29 +270,6 @@ def test_the_likelihood_has_the_last_word_where_noise_did_not_grow() -> None:
     assert not accept(replace(found, as_sure=False))
 
 
-def test_what_a_channel_leans_to_is_no_veto_against_a_likelihood_that_decides_alone() -> None:
-    """A roll that gained 1825 +- 287 nats was refused for v_y by 0.16 +- 0.07 at 5 s."""
-    roll = Measures(gain(670.0), gain(500.0), gain(-16.0), plausible=True, as_sure=True)
-    leans = tuple(
-        ErrorChange(c, h, g, e)
-        for c, h, g, e in (
-            ("vy_mps", 1.0, 0.08, 0.04),
-            ("vy_mps", 2.0, 0.02, 0.05),
-            ("vy_mps", 5.0, 0.16, 0.07),
-            ("yaw_rate_radps", 1.0, 0.04, 0.03),
-            ("ay_mps2", 1.0, 0.02, 0.03),
-        )
-    )
-    assert worse(leans)
-    assert not worse(leans, leaning=False)
-    assert accept(replace(roll, changes=leans))
-    # It is one where the likelihood does not decide alone, and what is clear is one always.
-    assert not accept(replace(roll, as_sure=False, changes=leans))
-    assert not accept(replace(roll, own_gain=gain(120.0), changes=leans))
-    clear = replace(leans[2], error=0.05)
-    assert not accept(replace(roll, changes=(*leans[:2], clear, *leans[3:])))
-
-
 def test_one_spin_neither_confirms_nor_refuses() -> None:
     """In one piece of the driving the sums are a million times those of the others."""
     spin = Gain(-77e6, 77e6, 150.0, 30.0)

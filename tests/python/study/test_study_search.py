@@ -96,11 +96,7 @@ def test_steps_with_which_the_model_errs_more_ahead_than_the_baseline_are_taken_
     assert trail.taken_back == ("head_wind",)
     trail.without_harm(baseline.driving, USUAL)
     assert trail.fits == [baseline, good]
-    assert trail.taken_back == ("head_wind",)
-    said = [text for text in cautions(trail, (), baseline.driving) if "removed again" in text]
-    assert [text.split()[0] for text in said] == ["head_wind"]
-    trail.fits.append(bad)  # a later step may bring it back
-    assert not any("removed again" in text for text in cautions(trail, (), baseline.driving))
+    assert trail.taken_back == ()
 
 
 def test_an_effect_with_which_errors_are_larger_where_it_acts_is_taken_out(
@@ -145,43 +141,6 @@ def test_an_effect_with_which_errors_are_larger_where_it_acts_is_taken_out(
     assert left().harmful == ()
     shares |= {"aero_drag": Share(-0.2, -0.3, -0.1), "head_wind": Share(-0.5, -0.7, -0.3)}
     assert left().fits == [baseline]
-
-
-@pytest.mark.parametrize("ends", [np.inf, 0.0])
-def test_without_what_did_harm_the_search_goes_on(
-    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch, ends: float
-) -> None:
-    """What it hid is sought then, as far as there is time; it is no candidate any more."""
-    baseline = hidden_fit("aero_drag.drag_area_m2", 0.6)
-    dx = diagnose(baseline, candidates=["aero_drag"])
-    good = dx.ranking[0].fit
-    assert good is not None
-    wind = replace(good, model=baseline.model.add("head_wind"))
-    steps, harms = [wind, good], [True, False]
-    asked: list[tuple[str, ...]] = []
-
-    def follow(looking: Search, trail: Trail) -> None:
-        asked.append(tuple(map(str, looking.candidates)))
-        assert trail.full == trail.stopped == ()
-        trail.full = ("mass",)
-        assert len(trail.diagnoses) == len(trail.fits) - 1
-        trail.fits.append(steps.pop(0))
-        trail.diagnoses += [dx, replace(dx, fit=trail.fit)]
-
-    def without(_: Search, trail: Trail) -> bool:
-        if harm := harms.pop(0):
-            trail.harmful += ("head_wind",)
-            del trail.fits[1:], trail.diagnoses[1:]
-        return harm
-
-    monkeypatch.setattr(Search, "follow", follow)
-    monkeypatch.setattr(Search, "take_out_harmful", without)
-    trail = Trail([baseline])
-    begun = replace(search(baseline, 2), ends=ends, finer=refining())
-    begun.settle(trail)
-    less = tuple(e for e in AGAINST if e != "head_wind")
-    assert asked == ([tuple(AGAINST), less] if ends else [tuple(AGAINST)])
-    assert trail.fit is (good if ends else baseline)
 
 
 def test_what_a_fit_left_open_does_not_speak_against_a_step(

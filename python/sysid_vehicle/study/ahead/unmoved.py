@@ -1,10 +1,9 @@
 """What effects do to errors ahead of channels that they do not move.
 
 A drag changes the speed ahead, and leaves less noise along the car, under which the tyres are
-fitted anew. A body that rolls turns the car differently, and beside it a factor on the wheel force
-is fitted anew. A body that leans changes what the accelerometer reads, and tyres that had answered
-for that are fitted anew. Where the model is not the car, other tyres or another factor are another
-compromise: single channels and horizons grow by chance.
+fitted anew. A body that leans changes what the accelerometer reads, and tyres that had answered for
+that are fitted anew. Where the model is not the car, other tyres are another compromise: single
+channels and horizons grow by chance.
 """
 
 from __future__ import annotations
@@ -18,21 +17,15 @@ from ...effects import Effect
 from ...estimate import Driving
 from ...identify import Fit
 from ...rules import ErrorChange
-from .horizons import ALONG, LATERAL, PREDICTED, changes
+from .horizons import LATERAL, PREDICTED, changes
 
-LATERAL_MOTION, ALONG_THE_CAR, MOTION = "lateral motion", "motion along the car", "motion"
+LATERAL_MOTION, MOTION = "lateral motion", "motion"
 
 
 def along_alone(one: Fit, other: Fit) -> bool:
     """Whether effects that only one of two models has move the car along it and no other way."""
     between = _between(one, other)
     return bool(between) and all(e.along_alone for e in between)
-
-
-def lateral_alone(one: Fit, other: Fit) -> bool:
-    """Whether effects that only one of two models has are lateral, all of them."""
-    between = _between(one, other)
-    return bool(between) and all(e.lateral_alone for e in between)
 
 
 def changes_of(
@@ -42,9 +35,8 @@ def changes_of(
 
     As `changes`. Where nothing but effects along the car tells the models apart, lateral errors
     are one figure, the mean over channels and horizons, with the parameters of the model before
-    where these predict better. So are errors along the car where nothing but lateral effects tells
-    them apart, and the errors of speeds and yaw rate where nothing but what the accelerometer feels
-    does, and the wheel force drives the car instead of it.
+    where these predict better. So are the errors of speeds and yaw rate where nothing but what the
+    accelerometer feels tells them apart, and the wheel force drives the car instead of it.
 
     Parameters
     ----------
@@ -78,8 +70,6 @@ def _unmoved(before: Fit, after: Fit, driving: Driving) -> tuple[str, Collection
     """Channels that nothing which tells two models apart moves, by one name."""
     if along_alone(before, after):
         return LATERAL_MOTION, LATERAL
-    if lateral_alone(before, after):
-        return ALONG_THE_CAR, ALONG
     between = _between(before, after)
     if driving.force_known and between and all(e.felt_alone for e in between):
         return MOTION, [c for c in PREDICTED if c not in ("ax_mps2", "ay_mps2")]

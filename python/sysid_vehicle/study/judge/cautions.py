@@ -52,10 +52,9 @@ def cautions(
             f"{' and '.join(trail.harmful)} removed again: where such an effect acts, errors 1 to "
             "5 s ahead of validation data are larger with it, beside the others"
         )
-    taken_back = [e for e in dict.fromkeys(trail.taken_back) if e not in fit.model.effects]
-    if taken_back:
+    if trail.taken_back:
         found.append(
-            f"{' and '.join(taken_back)} removed again: errors 1 to 5 s ahead fall with the "
+            f"{' and '.join(trail.taken_back)} removed again: errors 1 to 5 s ahead fall with the "
             "parameters that predict best, but grow with those of the likelihood, whatever the "
             "driving leaves open"
         )

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -67,26 +67,6 @@ class Search:
     say: Callable[[str], None]
     judged_by: float = math.inf
     finer: Sequence[Effect] = ()
-
-    def settle(self, trail: Trail) -> None:
-        """Follow the way to its end, without what does harm there.
-
-        What was hidden by an effect that is taken out again is sought then: a lever arm of the
-        accelerometer may stand for a body that rolls, until a lean is beside it.
-        """
-        search = self
-        while True:
-            search.follow(trail)
-            trail.without_harm(self.test, self.rules)
-            if not self.take_out_harmful(trail) or time.perf_counter() > self.ends:
-                return
-            search = replace(
-                self,
-                candidates=[c for c in self.candidates if _name(c) not in trail.harmful],
-                finer=[e for e in self.finer if e.id not in trail.harmful],
-            )
-            trail.diagnoses.pop()  # `follow` asks anew, with refits
-            trail.stopped, trail.full = (), ()
 
     def follow(self, trail: Trail) -> None:
         """Add what is missing to the last model until nothing more is that the driving can show."""
@@ -162,25 +142,24 @@ class Search:
             return set()
         return {c.id for c in dx.significant if c.fit is not None}
 
-    def take_out_harmful(self, trail: Trail) -> bool:
+    def take_out_harmful(self, trail: Trail) -> None:
         """Take effects out of the last model with which errors ahead are shown to be larger.
 
         Where they move something, on validation data, beside all others: when they came that may
         not have shown, and it hides what the others take. Where nothing is left shares are noise.
-        Says whether any was taken out.
         """
-        baseline, before_it = trail.fits[0].model.effects, trail.harmful
+        baseline = trail.fits[0].model.effects
         while len(trail.fits) > 1 and trail.diagnoses[-1].omnibus.rejects:
             fit = trail.fit
             added = [e for e in fit.model.effects if e not in baseline]
             own = own_shares(fit, added, added, self.test, self.judged_by, self.rules)
             worst = [(s.value, e) for e, (s, _) in own.items() if harmful(s, self.rules)]
             if not worst:
-                break
+                return
             name = min(worst)[1]
             poorer = before(self.judged_by, partial(self._without, fit, name), None)
             if poorer is None:
-                break
+                return
             trail.harmful += (name,)
             if len(added) > 1:
                 trail.fits.append(beside_noise(poorer))
@@ -188,7 +167,6 @@ class Search:
             else:
                 del trail.fits[1:], trail.diagnoses[1:]
             self.say(f"Removed {name}.")
-        return trail.harmful != before_it
 
     def give_back(self, trail: Trail) -> None:
         """Find anew what nuisances are in each log, with all effects of the last model beside them.
@@ -254,7 +232,3 @@ class Search:
             seed=self.seed,
             progress=self.progress,
         )
-
-
-def _name(candidate: str | Effect) -> str:
-    return candidate if isinstance(candidate, str) else candidate.id

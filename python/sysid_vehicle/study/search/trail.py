@@ -107,7 +107,7 @@ class Trail:
         while len(self.fits) > 1 and harms():
             self.fits.pop()
             self.diagnoses.pop()
-        self.taken_back += tuple(e for e in last if e not in self.fit.model.effects)
+        self.taken_back = tuple(e for e in last if e not in self.fit.model.effects)
 
     def note_several(
         self, dx: Diagnosis, chosen: Sequence[str], rivals: Mapping[str, InPlace]
