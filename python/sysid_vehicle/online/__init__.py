@@ -26,7 +26,8 @@ from .mu_slip.noise import MuSlipNoiseStudy, mu_slip_over_noise
 from .mu_slip.results import MuSlipEstimate, MuSlipRun, MuSlipSmoothed
 from .sideslip import KINDS, SideslipEstimate, SideslipObserver, estimate_sideslip
 from .sideslip_calibration import SideslipCalibration, calibrate_sideslip, fitted_vehicle
-from .sideslip_results import SideslipError, SideslipRun, sideslip_overview
+from .sideslip_error import SideslipError
+from .sideslip_results import SideslipRun, sideslip_overview
 from .sideslip_settings import SideslipSettings
 
 __all__ = [

@@ -17,6 +17,7 @@ from .._common.text import number, text_table
 from .._common.typed import typed
 from ..errors import warn
 from ..vehicle import Vehicle
+from .sideslip_error import SideslipError
 from .sideslip_settings import SideslipSettings
 
 if TYPE_CHECKING:
@@ -32,39 +33,10 @@ _UNUSED = (
     "friction of which less than half was used is mostly that of the vehicle file: on ice or snow "
     "it reads too high"
 )
-
-
-@dataclass(frozen=True)
-class SideslipError:
-    """Estimated less true sideslip.
-
-    Attributes
-    ----------
-    rms_deg, max_deg : float
-        Size of the error.
-    covered : float
-        Share of samples whose true sideslip lies in the band of 2 standard deviations, of the
-        estimate and of the noise of the measured sideslip together.
-    noise_deg : float
-        What the noise of the measured sideslip makes of the rms.
-    bands : tuple of (low, high, rms_deg, samples)
-        Error by size of the lateral acceleration [m/s2].
-    """
-
-    rms_deg: float
-    max_deg: float
-    covered: float
-    bands: tuple[tuple[float, float, float, int], ...]
-    noise_deg: float = 0.0
-
-    def __str__(self) -> str:
-        noise = f", {self.noise_deg:.3f} of it noise of the measured one" if self.noise_deg else ""
-        rows = [[f"{a:g} .. {b:g}", f"{rms:.3f}", str(n)] for a, b, rms, n in self.bands]
-        return (
-            f"error: {self.rms_deg:.3f} deg rms{noise}, {self.max_deg:.2f} deg at most; "
-            f"{100.0 * self.covered:.1f} % of samples inside 2 sigma\n"
-            + text_table(["|a_y| [m/s2]", "rms [deg]", "samples"], rows)
-        )
+_LEARNED = 0.5  # of its relative standard deviation at the beginning: the log tells three quarters
+_UNTOLD = (
+    "this driving tells little of the cornering stiffness: it is mostly that of the vehicle file"
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -213,12 +185,19 @@ class SideslipRun(Told):
             lines.append(text_table(head, rows))
             if (at_most < _STRAIGHT * np.array([self.mu_f[k], self.mu_r[k]])).any():
                 lines.append(f"  {_UNUSED}")
+            if self.kind == "dual" and self._untold(k):
+                lines.append(f"  {_UNTOLD}")
         for mode, meaning in ((1, "too slow to tell"), (2, "with a sensor missing or refused")):
             share = float(np.mean(self.mode == mode))
             if share > 0.0:
                 lines.append(f"  {100.0 * share:.3g} % of samples {meaning}")
         found = self.error()
         return "\n".join([*lines, *([str(found)] if found is not None else [])])
+
+    def _untold(self, k: np.intp) -> bool:
+        """Whether the cornering stiffness of an axle is known hardly better than at first."""
+        share = [s / c for s, c in ((self.cf_std_npr, self.cf_npr), (self.cr_std_npr, self.cr_npr))]
+        return any(x[k] > _LEARNED * x[0] for x in share)
 
     def _tyres_said(self) -> list[str]:
         if self.kind == "dual":

@@ -211,6 +211,18 @@ def test_on_ice_with_tyres_of_a_dry_road_nobody_is_told_that_the_friction_is_kno
     assert told.mu_f[-1] < 0.2
 
 
+@pytest.mark.filterwarnings("ignore:.*not excited")
+def test_a_stiffness_that_the_driving_does_not_tell_is_not_told_as_found(vehicle, log):
+    """On a straight that of a vehicle file four times too soft stood there as 44 +- 15 kN/rad."""
+    straight = sv.drive(
+        sv.Model(vehicle), sv.manoeuvres.straight_acceleration(), seed=995871, rate_hz=50.0
+    )
+    untold = "tells little of the cornering stiffness: it is mostly that of the vehicle file"
+    assert untold in str(estimate_sideslip(vehicle, straight))
+    assert untold not in str(estimate_sideslip(vehicle, log))
+    assert untold not in str(estimate_sideslip(vehicle, straight, kind="ukf"))
+
+
 def test_friction_is_used_under_the_load_that_braking_moves(vehicle, log):
     """Of a rear axle more was told to be used than the friction told beside it."""
     run = estimate_sideslip(vehicle, log)
