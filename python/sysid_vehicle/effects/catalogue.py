@@ -182,6 +182,11 @@ class Effect:
         return self.moved <= {"vx_mps", "ax_mps2"}
 
     @property
+    def lateral_alone(self) -> bool:
+        """Whether it moves the car sideways or turns it, and does nothing to its speed first."""
+        return self.moved <= {"vy_mps", "yaw_rate_radps", "ay_mps2"}
+
+    @property
     def felt_alone(self) -> bool:
         """Whether it changes what the accelerometer reads and nothing else, as its bias does.
 

@@ -108,7 +108,30 @@ def test_lateral_errors_are_one_figure_beside_an_effect_along_the_car(
     for model in (fit.model.add("steer_ratio"), fit.model):
         found = replace(fit, model=model.with_values(other_tyres))
         assert not along_alone(fit, found)
-        assert changes_of(fit, found, driving, AHEAD) == changes(fit, found, driving, AHEAD)
+        told, each = (
+            [c for c in changed(fit, found, driving, AHEAD) if c.channel in LATERAL]
+            for changed in (changes_of, changes)
+        )
+        assert told == each
+    assert changes_of(fit, found, driving, AHEAD) == changes(fit, found, driving, AHEAD)
+
+
+def test_errors_along_the_car_are_one_figure_beside_a_lateral_effect(fit: Fit, course: Log) -> None:
+    """Beside another yaw inertia a factor on the wheel force is fitted anew."""
+    driving = Driving.of(course)
+    gained = replace(fit, model=fit.model.add("force_gain"))
+    forced = {"force_gain.drive_error": 0.3}
+    turned = gained.model.add("yaw_inertia")
+    other = replace(fit, model=turned.with_values(forced))
+    assert {c.channel for c in worse(changes(gained, other, driving, AHEAD))} & ALONG
+    told = changes_of(gained, other, driving, AHEAD)
+    assert {c.channel for c in told} == {*LATERAL, "motion along the car"}
+    assert "motion along the car" not in {c.channel for c in worse(told)}
+    # What it does itself counts, and so does the force without it.
+    heavy = replace(fit, model=turned.with_values({"yaw_inertia.relative_error": 2.0}))
+    assert {c.channel for c in worse(changes_of(gained, heavy, driving, AHEAD))} & {*LATERAL}
+    alone = replace(fit, model=gained.model.with_values(forced))
+    assert {c.channel for c in worse(changes_of(gained, alone, driving, AHEAD))} & ALONG
 
 
 def test_what_the_accelerometer_feels_answers_for_no_motion(fit: Fit, course: Log) -> None:

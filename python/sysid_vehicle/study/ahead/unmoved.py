@@ -1,9 +1,10 @@
 """What effects do to errors ahead of channels that they do not move.
 
 A drag changes the speed ahead, and leaves less noise along the car, under which the tyres are
-fitted anew. A body that leans changes what the accelerometer reads, and tyres that had answered for
-that are fitted anew. Where the model is not the car, other tyres are another compromise: single
-channels and horizons grow by chance.
+fitted anew. A body that rolls turns the car differently, and beside it a factor on the wheel force
+is fitted anew. A body that leans changes what the accelerometer reads, and tyres that had answered
+for that are fitted anew. Where the model is not the car, other tyres or another factor are another
+compromise: single channels and horizons grow by chance.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from ...effects import Effect
 from ...estimate import Driving
 from ...identify import Fit
 from ...rules import ErrorChange
-from .horizons import LATERAL, PREDICTED, changes
+from .horizons import ALONG, LATERAL, PREDICTED, changes
 
-LATERAL_MOTION, MOTION = "lateral motion", "motion"
+LATERAL_MOTION, ALONG_THE_CAR, MOTION = "lateral motion", "motion along the car", "motion"
 
 
 def along_alone(one: Fit, other: Fit) -> bool:
@@ -35,8 +36,9 @@ def changes_of(
 
     As `changes`. Where nothing but effects along the car tells the models apart, lateral errors
     are one figure, the mean over channels and horizons, with the parameters of the model before
-    where these predict better. So are the errors of speeds and yaw rate where nothing but what the
-    accelerometer feels tells them apart, and the wheel force drives the car instead of it.
+    where these predict better. So are errors along the car where nothing but lateral effects tells
+    them apart, and the errors of speeds and yaw rate where nothing but what the accelerometer feels
+    does, and the wheel force drives the car instead of it.
 
     Parameters
     ----------
@@ -71,6 +73,8 @@ def _unmoved(before: Fit, after: Fit, driving: Driving) -> tuple[str, Collection
     if along_alone(before, after):
         return LATERAL_MOTION, LATERAL
     between = _between(before, after)
+    if between and all(e.lateral_alone for e in between):
+        return ALONG_THE_CAR, ALONG
     if driving.force_known and between and all(e.felt_alone for e in between):
         return MOTION, [c for c in PREDICTED if c not in ("ax_mps2", "ay_mps2")]
     return "", ()
