@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study.search.search import Search
 from sysid_vehicle.study.search.steps import likeliest
@@ -99,3 +100,27 @@ def test_what_the_time_limit_left_untried_is_not_what_was_refused(
     untried = {c.id for c in dx.significant} if late_in == "first_that_holds" else set()
     assert set(trail.stopped) == untried
     assert trail.unpaired is (late_in == "_beside_others")
+
+
+def test_what_fits_as_well_in_the_place_of_one_of_several_is_tried_there(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Subsets with either score alike, and one of them is refitted: that with a side wind."""
+    car = truth.add("steer_offset").with_values({"steer_offset.offset_rad": 0.012})
+    train, test = (
+        drive(car, manoeuvres.lap(20.0), seed=seed, rate_hz=50.0) for seed in (995881, 995882)
+    )
+    baseline = identify(start, train, starts=1)
+    both = ("steer_offset", "side_wind")
+    dx = diagnose(baseline, candidates=both)
+    windy = next(c.fit for c in dx.ranking if c.id == "side_wind")
+    assert windy is not None
+    at = "sysid_vehicle.study.search.search."
+    wind = [(("side_wind",), windy)]
+    monkeypatch.setattr(f"{at}first_that_holds", lambda *_: None)
+    monkeypatch.setattr(f"{at}first_together", lambda *_: wind.pop() if wind else None)
+    looking = replace(looking_for_both(baseline), candidates=both, test=Driving.of(test))
+    trail = Trail([baseline])
+    looking.follow(trail)
+    assert [f.model.effects for f in trail.fits] == [(), ("steer_offset",)]
+    assert "steer_offset" in {c.id for c in trail.nearly["side_wind"]}

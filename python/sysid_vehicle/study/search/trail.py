@@ -114,7 +114,8 @@ class Trail:
     ) -> None:
         """Remember what was chosen together, and what is confounded with each of it.
 
-        So by the posterior, and as `in_place_of` finds.
+        So by the posterior, and as `in_place_of` finds. What fits as well in the place of one was
+        nearly chosen: of subsets that score alike one alone is refitted.
         """
         self.sizes |= dx.sizes
         for name in chosen:
@@ -126,6 +127,7 @@ class Trail:
             alike = dict.fromkeys((*others, *in_place.names))
             self.rivals[name] = tuple(e for e in alike if e in known)
             self.sizes |= in_place.sizes
+            self.nearly[name] = in_place.rivals
 
     def note(self, dx: Diagnosis, chosen: Candidate) -> None:
         """Remember what was chosen, and what nearly was."""
