@@ -74,7 +74,7 @@ NUMERICAL = {
     },
     "study/judge/slow.py": {"_AT_LONGEST"},
     "study/search/search.py": {"_UNSEEN"},
-    "study/search/steps.py": {"_ALTERNATIVES"},
+    "study/search/steps.py": {"ALTERNATIVES"},
     "study/judge/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
     "study/search/together.py": {"_LEAST", "_SUBSETS"},
     # Descriptions of the unknown, of biases, and of the next drive.

@@ -203,3 +203,13 @@ def test_a_mass_with_a_yaw_inertia_may_be_a_gain_of_the_force(truth: Model, star
     few = diagnose(found, candidates=("mass", "aero_drag"), refits=0)
     alone = in_place_of(found, ("force_gain",), few)["force_gain"]
     assert "mass" not in alone.names
+
+
+def test_the_likeliest_rivals_are_tried_in_an_effects_place() -> None:
+    wind, toe, bank = (
+        Candidate(effect(e), 9.0, 1e-9, (0.1,), (0.01,), 1.0, 1.0)
+        for e in ("side_wind", "rear_toe", "road_bank")
+    )
+    told = together.InPlace((wind, toe, bank), (-2.0, 3.0, 1.0))
+    assert told.likeliest == (toe, bank)
+    assert together.InPlace().likeliest == ()

@@ -36,7 +36,7 @@ from ..validation import (
     gain_with_exact_inputs,
 )
 
-_ALTERNATIVES = 2  # tried in place of one effect
+ALTERNATIVES = 2  # tried in place of one effect
 
 
 def first_that_holds(
@@ -151,7 +151,7 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
 
     others = [c for c in dx.ranking if c.id != chosen.id]
     apart = [c for c in others if abs(c.statistic - chosen.statistic) >= same]
-    return tuple([c for c in apart if c.fit is not None and near(c, c.fit)][:_ALTERNATIVES])
+    return tuple([c for c in apart if c.fit is not None and near(c, c.fit)][:ALTERNATIVES])
 
 
 def in_common(

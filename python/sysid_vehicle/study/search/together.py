@@ -21,7 +21,15 @@ from ...identify import Fit, refine, refine_while, refit, with_exact_inputs
 from ...model import Model
 from ...rules import USUAL, Rules, bic
 from ..ahead.own_share import without
-from .steps import better, merit, real, speaks_for, strength, without_insignificant
+from .steps import (
+    ALTERNATIVES,
+    better,
+    merit,
+    real,
+    speaks_for,
+    strength,
+    without_insignificant,
+)
 
 _SUBSETS = 2  # that are refitted
 _LEAST = 1.0  # standard errors from nothing, below which the refit of a subset does not go on
@@ -91,6 +99,12 @@ class InPlace:
     def sizes(self) -> dict[str, Size]:
         """Parameters of the rivals in the effect's place, and their standard errors."""
         return {c.id: (c.value, c.std) for c in self.rivals}
+
+    @property
+    def likeliest(self) -> tuple[Candidate, ...]:
+        """As many rivals as are tried in the effect's place, the likeliest ones."""
+        led = zip(self.leads, self.rivals, strict=True)
+        return tuple(c for _, c in sorted(led, key=lambda of: -of[0])[:ALTERNATIVES])
 
     def better(self, rules: Rules = USUAL) -> tuple[Candidate, ...]:
         """Rivals that are more likely by `Rules.apart`."""

@@ -127,7 +127,7 @@ class Trail:
             alike = dict.fromkeys((*others, *in_place.names))
             self.rivals[name] = tuple(e for e in alike if e in known)
             self.sizes |= in_place.sizes
-            self.nearly[name] = in_place.rivals
+            self.nearly[name] = in_place.likeliest
 
     def note(self, dx: Diagnosis, chosen: Candidate) -> None:
         """Remember what was chosen, and what nearly was."""
