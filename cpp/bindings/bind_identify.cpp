@@ -14,9 +14,9 @@ void add_run(LogwiseProblem& logwise, double dt, const Array& inputs, const Arra
              const std::vector<double>& steer_after, const std::vector<double>& shift) {
     if (!shift.empty() && shift.size() != kParameterCount)
         throw std::invalid_argument("shift: expected one number for each parameter, or none");
-    Problem& problem = logwise.shifted(shift);
+    SingleTrack& model = logwise.shifted(shift).model;
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
-    const py::ssize_t own = problem.model.loads_known ? 4 : 2;
+    const py::ssize_t own = model.loads_known ? 4 : 2;
     const auto width =
         std::clamp<py::ssize_t>(inputs.ndim() == 2 ? inputs.shape(1) : 0, own, own + kUserChannels);
     const double* u = matrix(inputs, n, width, "inputs");
@@ -36,8 +36,8 @@ void add_run(LogwiseProblem& logwise, double dt, const Array& inputs, const Arra
         auto& channels = run.inputs[k].channels;
         channels.fill(std::nan(""));
         std::copy(u + own, u + width, channels.begin());
-        if (problem.model.loads_known) {
-            Axles<double>& most = problem.model.most_n;
+        if (model.loads_known) {
+            Axles<double>& most = model.most_n;
             run.inputs[k].loads_n = {u[2], u[3]};
             most = {std::max(most.front, u[2]), std::max(most.rear, u[3])};
         }
@@ -48,7 +48,7 @@ void add_run(LogwiseProblem& logwise, double dt, const Array& inputs, const Arra
             throw std::invalid_argument(log + "measurements: infinite at sample " +
                                         std::to_string(k));
     }
-    problem.runs.push_back(std::move(run));
+    logwise.add(shift, std::move(run));
 }
 
 Noise to_noise(const Array& values) {

@@ -1,6 +1,7 @@
 #include "sysid/identify/logwise.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace sysid {
@@ -78,6 +79,16 @@ Problem& LogwiseProblem::shifted(std::vector<double> shift) {
             parts.push_back({Problem{parts.back().problem.model, {}}, std::move(shift)});
     }
     return parts.back().problem;
+}
+
+void LogwiseProblem::add(std::vector<double> shift, Run run) {
+    constexpr double kClocks = 1e-5;  // of a second, how well quartz tells it
+    std::vector<Run>& runs = shifted(std::move(shift)).runs;
+    const auto alike = std::find_if(runs.begin(), runs.end(), [&](const Run& other) {
+        return std::abs(other.dt - run.dt) < kClocks * run.dt;
+    });
+    if (alike != runs.end()) run.dt = alike->dt;
+    runs.push_back(std::move(run));
 }
 
 LogwiseProblem LogwiseProblem::with_model(const SingleTrack& model) const {

@@ -88,10 +88,8 @@ Sum<L> one_after_the_other(const Problem& problem, const double* p, const Noise&
 template <int L>
 bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<L>& sum) {
     constexpr std::size_t kLongest = 1024;
-    // Room for the states of all effects costs more here than in the filter alone.
-    const bool lags = active_states(problem.model.effects).count > 0;
     const std::vector<Piece> pieces =
-        pieces_of(problem.runs, forgets_s(problem, noise), lags ? 1 : kFilterSamples, kLongest);
+        pieces_of(problem.runs, forgets_s(problem, noise), filter_samples(problem.model), kLongest);
     if (pieces.empty()) return false;
     LaneFilter filter(problem, {p}, noise, pieces);
     filter.with_transition = true;

@@ -32,13 +32,17 @@ std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pie
     for (std::size_t first = 0; first < pieces.size(); first += kLanes) {
         std::size_t longest = 0;
         double again = 0.0;
+        std::vector<double> intervals;  // each takes a step of its own (`by_length`)
         for (std::size_t i = first; i < pieces.size() && i < first + kLanes; ++i) {
+            const double dt = runs[pieces[i].run].dt;
             longest = std::max(longest, pieces[i].size());
-            if (pieces[i].begin > 0) again = std::max(again, forgotten_s / runs[pieces[i].run].dt);
+            if (pieces[i].begin > 0) again = std::max(again, forgotten_s / dt);
+            if (std::find(intervals.begin(), intervals.end(), dt) == intervals.end())
+                intervals.push_back(dt);
         }
         // Ways that meet too late are not walked to their end.
         if (again > kRounds * static_cast<double>(longest)) again = 1e9;
-        steps += longest + static_cast<std::size_t>(std::min(again, 1e9));
+        steps += intervals.size() * (longest + static_cast<std::size_t>(std::min(again, 1e9)));
     }
     return steps;
 }

@@ -1,6 +1,7 @@
 // Filters over pieces of driving side by side are those over whole runs.
 #include "kernels.hpp"
 #include "residuals.hpp"
+#include "sysid/identify/logwise.hpp"
 #include "sysid/identify/row_filter.hpp"
 #include "sysid/identify/side_by_side.hpp"
 #include "sysid/math/lanes.hpp"
@@ -185,6 +186,25 @@ TEST(Pieces, AreNoneWhereTheFilterHoldsTheSpeedForLong) {
     EXPECT_TRUE(pieces_of(problem.runs, forgets_s(problem, noise)).empty());
 }
 
+/// Lanes take steps of one length together: the clocks of loggers differ by less than is known.
+TEST(Pieces, TakeIntervalsThatClocksDoNotTellForOne) {
+    const SingleTrack car{saloon(), EffectMask{0}};
+    for (const double off : {1e-15, 2e-6, 1e-3}) {
+        LogwiseProblem joined(car);
+        std::vector<sysid::Run> apart;
+        for (unsigned i = 0; i < 5; ++i) {
+            apart.push_back(noisy_run(car, typical_parameters(), 400, 0.02 * (1.0 + i * off), i));
+            joined.add({}, apart.back());
+        }
+        const std::vector<sysid::Run>& runs = joined.parts[0].problem.runs;
+        const bool same = off < 1e-5;
+        EXPECT_EQ(runs[1].dt == runs[0].dt, same) << off;
+        // Five lengths take five steps for one, and there are no more than five lanes.
+        EXPECT_EQ(pieces_of(runs, 100.0).empty(), !same) << off;
+        EXPECT_TRUE(pieces_of(apart, 100.0).empty()) << off;
+    }
+}
+
 /// Of a force and a slope that are read as one, the slower forgets with the zero of their sum.
 TEST(Pieces, WaitUntilAForceIsToldFromTheSlopeOfTheRoad) {
     Problem problem = long_run(EffectMask{0});
@@ -337,11 +357,11 @@ TEST(SideBySideToo, WhatIsNotForgottenIsDoneInOneGo) {
 }
 
 TEST(SideBySideToo, RunsOfAnyNumberAndLength) {
-    Problem problem = long_run(EffectMask{0}, 1600);
+    Problem problem = long_run(EffectMask{0}, 3200);  // two intervals take two steps for one
     const SingleTrack& truth = problem.model;
     for (unsigned i = 0; i < 20; ++i)
         problem.runs.push_back(
-            noisy_run(truth, typical_parameters(), 2 + 7 * i, i % 3 == 0 ? 0.02 : 0.04, i));
+            noisy_run(truth, typical_parameters(), 2 + 7 * i, i % 3 == 0 ? 0.05 : 0.04, i));
     const auto pieces = pieces_of(problem.runs);
     ASSERT_GT(pieces.size(), 21U);
     std::size_t at = 0, run = 0;

@@ -1,4 +1,5 @@
 // Programs that recorded numbers write down, and the kernels that run them.
+#include <limits>
 #include <random>
 
 #include "helpers.hpp"
@@ -108,6 +109,27 @@ TEST_P(Kernels, GiveValuesAndDerivativesOfEveryStep) {
                 }
     }
     EXPECT_EQ(swept, kAsked - 2);  // one is an input, one a constant
+}
+
+/// Of lags that go to nothing, in some lanes or in all.
+TEST_P(Kernels, TakeExponentialsThatUnderflowForNothing) {
+    for (const double least : {0.0, 800.0}) {
+        Recorder to;
+        const Recorded x = to.input(true);
+        const Program program = to.program({exp(-x)});
+        std::vector<LaneRow> rows(static_cast<std::size_t>(program.rows));
+        LaneRow& given = rows[static_cast<std::size_t>(program.inputs[0])];
+        for (std::size_t lane = 0; lane < kLanes; ++lane)
+            given.at[lane] = least + 90.0 * static_cast<double>(lane);
+        given.at[kLanes - 1] = std::numeric_limits<double>::infinity();
+        const LaneRow before = given;
+        lane_kernels().forward(program.steps.data(), program.steps.size(), rows.data());
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            const double value = rows[static_cast<std::size_t>(program.outputs[0])].at[lane];
+            const double wanted = std::exp(-before.at[lane]);
+            EXPECT_NEAR(value, wanted, 1e-13 * wanted + 1e-300) << "x " << before.at[lane];
+        }
+    }
 }
 
 TEST_P(Kernels, AgreeOnAllEffects) {

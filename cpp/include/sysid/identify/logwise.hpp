@@ -20,6 +20,9 @@ struct LogwiseProblem {
 
     /// The problem that takes further runs whose parameters are shifted so.
     Problem& shifted(std::vector<double> shift);
+    /// Takes a run whose parameters are shifted so. Its sampling interval is that of runs that are
+    /// there, where the two differ by less than clocks are known to: lanes take steps alike.
+    void add(std::vector<double> shift, Run run);
     LogwiseProblem with_model(const SingleTrack& model) const;
     std::size_t samples() const;
 };
