@@ -20,10 +20,11 @@ Vec<N> to_vector(const Array& a, const char* name) {
     return Eigen::Map<const Vec<N>>(vector(a, N, name));
 }
 
-ObserverModel to_model(const Array& car, const std::array<bool, 5>& form, double dt) {
+ObserverModel to_model(const Array& car, const std::array<bool, 5>& form, double dt,
+                       bool inputs_held = true) {
     const double* c = vector(car, 5, "car");
     const ObserverCar believed{c[0], c[1], c[2], c[3], c[4]};
-    const ObserverForm equations{form[0], form[1], form[2], form[3], form[4]};
+    const ObserverForm equations{form[0], form[1], form[2], form[3], form[4], inputs_held};
     return {believed, equations, dt};
 }
 
@@ -43,12 +44,13 @@ ObserverInput to_input(const double* u) { return {u[0], u[1], u[2], u[3]}; }
 
 ObserverLog to_log(const Array& car, const std::array<bool, 5>& form, double dt,
                    const Array& inputs, const Array& readings, const Array& mean,
-                   const Array& covariance, bool one_before) {
+                   const Array& covariance, bool one_before, bool inputs_held) {
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
     if (n < 2) throw std::invalid_argument("inputs: expected two samples or more");
     const double* u = matrix(inputs, n, 4, "inputs");
     const double* y = matrix(readings, n, 4, "readings");
-    ObserverLog log{to_model(car, form, dt), {}, {}, to_start(mean, covariance, one_before)};
+    ObserverLog log{
+        to_model(car, form, dt, inputs_held), {}, {}, to_start(mean, covariance, one_before)};
     for (py::ssize_t k = 0; k < n; ++k) {
         log.inputs.push_back(to_input(u + 4 * k));
         log.readings.emplace_back(Eigen::Map<const ObserverReading>(y + 4 * k));
@@ -91,7 +93,8 @@ py::dict to_dict(const ObserverEm& em) {
 void register_lab_observer(py::module_& m) {
     py::class_<ObserverLog>(m, "ObserverLog")
         .def(py::init(&to_log), py::arg("car"), py::arg("form"), py::arg("dt"), py::arg("inputs"),
-             py::arg("readings"), py::arg("mean"), py::arg("covariance"), py::arg("one_before"))
+             py::arg("readings"), py::arg("mean"), py::arg("covariance"), py::arg("one_before"),
+             py::arg("inputs_held"))
         .def_property_readonly("samples", &ObserverLog::size)
         .def(
             "log_likelihood",

@@ -337,6 +337,7 @@ class ObserverLog(metaclass=_Bound):
         mean: _Array,
         covariance: _Array,
         one_before: bool,
+        inputs_held: bool,
     ) -> None: ...
     @property
     def samples(self) -> int: ...

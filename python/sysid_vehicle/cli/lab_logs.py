@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -86,7 +87,10 @@ def em(args: argparse.Namespace, heard: list[str]) -> None:
         most_iterations=args.iterations,
     )
     observer = Observer(car, result.noise)
-    estimates = [observer.smoothed(record) for record in records]
+    estimates = [
+        observer.smoothed(replace(record, inputs_held=held))
+        for record, held in zip(records, result.inputs_held, strict=True)
+    ]
     print(result)
     for estimate in estimates:
         print()
@@ -126,6 +130,11 @@ def identify_arguments(parser: argparse.ArgumentParser) -> None:
         "--residual-terms", action="store_true", help="also fit P1, P2 and P3 of a_y"
     )
     parser.add_argument(
+        "--combined-slip",
+        choices=("yes", "no"),
+        help="whether drive and brake force cost side force (default: what is likelier)",
+    )
+    parser.add_argument(
         "--starts", type=int, default=16, metavar="N", help="searches (default: %(default)s)"
     )
     parser.add_argument(
@@ -150,6 +159,7 @@ def identify(args: argparse.Namespace, heard: list[str]) -> None:
         car,
         logs,
         residual_terms=args.residual_terms,
+        combined_slip=None if args.combined_slip is None else args.combined_slip == "yes",
         starts=args.starts,
         method=args.method,
         profiles=not args.fast,

@@ -205,7 +205,10 @@ def cornering_stiffness(
 
     It knows neither tyres that answer late nor load that braking moves between the axles: of a slow
     vehicle with a long relaxation length (a bus at 8 to 20 m/s, 0.6 m) the front stiffness came
-    out 19 % low, beyond its standard deviation. `estimate_sideslip` knows both.
+    out 19 % low, beyond its standard deviation. Of five simulated cars (0.35 to 0.7 m, 16 to 28
+    m/s, up to 3 m/s2, a vehicle file with generic tyres) it was 2 to 9 % low, in 4 of 10 axles
+    beyond two standard deviations: the tyres are late, and bend more than those of the
+    file. `estimate_sideslip` knows both.
 
     Parameters
     ----------

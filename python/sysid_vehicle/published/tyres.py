@@ -47,7 +47,7 @@ class TyreRegression(Printed):
     ----------
     loss : str
         One of `LOSSES`.
-    parameters : array, shape (14,)
+    parameters : array, shape (15,)
         All of `lab.tyre_fit.PARAMETERS`.
     value : float
         The loss there, summed over all samples.

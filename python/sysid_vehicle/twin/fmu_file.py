@@ -11,8 +11,9 @@ Kind = Literal["model_exchange", "co_simulation"]
 
 def read_description(path: str) -> Any:
     """The model description, whatever a file that is no FMU makes FMPy raise."""
+    fmpy = fmpy_module()
     try:
-        return fmpy_module().read_model_description(path)
+        return fmpy.read_model_description(path)
     except Exception as error:
         raise InvalidInput(
             f"{path}: is no FMU that can be read ({type(error).__name__}: {error}); export the "

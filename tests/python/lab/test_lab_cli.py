@@ -111,7 +111,7 @@ def test_validation_on_another_car_is_refused(
     lap.to_csv(tmp_path / "lap.csv")
     other = dataclasses.asdict(GreyBoxVehicle(400.0, 600.0, 1.25, 1.35))
     tyres = [10.0, 1.4, 1.0, 0.0] * 2
-    values = [*tyres, 0.0, 0.0, 0.0, 1.0, 1.0, 0.5]
+    values = [*tyres, 0.0, 0.0, 0.0, 1.0, 1.0, 0.5, 0.0]
     told = {
         "vehicle": other,
         "parameters": dict(zip(PARAMETERS, values, strict=True)),

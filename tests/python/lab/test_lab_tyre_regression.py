@@ -195,7 +195,7 @@ def test_eliminated_parameters_are_the_best_ones() -> None:
     linear = [PARAMETERS.index(n) for n in ("D_front", "D_rear", "P1", "P2", "P3")]
     box = box_of(["D_front", "D_rear", "P1", "P2", "P3"], {})
     problem = Regression(loss, linear, box.lower, box.upper)
-    p = np.array([20.0, 1.7, 1.0, 0.5, 20.0, 1.5, 1.0, 0.0, 0, 0, 0, 1, 1, 0.5])
+    p = np.array([20.0, 1.7, 1.0, 0.5, 20.0, 1.5, 1.0, 0.0, 0, 0, 0, 1, 1, 0.5, 0.0])
     full = problem.complete(p)
     least = loss.half_sum_of_squares(full, None)
     assert problem.half_sum_of_squares(p) == pytest.approx(least)

@@ -115,3 +115,41 @@ def test_readings_of_little_slip_determine_no_bias(seed: int) -> None:
     assert "corrected: left out, the readings do not determine the curve" in str(found)
     with pytest.raises(InvalidInput, match="take readings on both sides of the peak"):
         online.mu_slip_fit(data, corrected=True)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.03])
+def test_noise_in_the_slip_is_named_and_is_no_offset(offset: float) -> None:
+    """Least squares take slip as exact: an offset or another curve was told in 15 of 16 sets."""
+    at, noise = online.sinusoidal_slip(), 0.01
+    told, offsets = [], 0
+    for seed in range(16):
+        rng = np.random.default_rng(3000 + seed)
+        mu = online.TWO_PARAMETER.mu(at, (0.9, 0.12)) + 0.02 * rng.standard_normal(at.size)
+        slip = at + offset + noise * rng.standard_normal(at.size)
+        notes = "; ".join(online.compare_mu_slip(online.MuSlipData(slip, mu)).notes)
+        assert "slip: readings scatter more where the curve is steep" in notes
+        assert "does not fit" not in notes
+        told.append(float(notes.split("noise of about ")[1].split(" in it")[0]))
+        offsets += "slip: with an offset of" in notes
+    assert np.mean(told) == pytest.approx(noise, rel=0.4)
+    assert offsets == 0 if offset == 0.0 else offsets >= 8
+
+
+def test_few_readings_with_noise_in_the_slip_tell_no_offset() -> None:
+    """A steep curve scatters most at its foot, which decides on an offset (6 of 20 before)."""
+    at = (np.arange(41) / 40.0) ** 2
+    for seed in range(20):
+        rng = np.random.default_rng(4000 + seed)
+        mu = online.TWO_PARAMETER.mu(at, (0.9, 0.12)) + 0.005 * rng.standard_normal(at.size)
+        data = online.MuSlipData(at + 0.01 * rng.standard_normal(at.size), mu)
+        assert "with an offset of" not in str(online.compare_mu_slip(data))
+
+
+def test_the_iterated_filter_is_not_made_sure_by_one_odd_reading() -> None:
+    """At little slip one reading in 3000 sets led to slip_peak 0.04, as if known to 0.05 (1312)."""
+    worst = 0.0
+    for seed, factor in ((1312, 3.0), *((s, 1.0) for s in range(5000, 5060))):
+        data = online.simulate_mu_slip((0.35, 0.15), noise_std=0.04, seed=seed)
+        run = online.mu_slip_ekf(data, iterations=10, noise_factor=factor)
+        worst = max(worst, float(np.abs(run.mean[-1] / (0.35, 0.15) - 1.0).max()))
+    assert worst < 0.4

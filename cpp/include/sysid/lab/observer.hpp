@@ -39,6 +39,9 @@ struct ObserverForm {
     bool exact_sampling = true;   // inputs held and dynamics sampled exactly, not by Euler's rule
     bool coupling = true;         // v_y r in the v_x equation and the full Jacobian
     bool speed_predicted = true;  // a_y with the predicted speed, not the estimate before it
+    // Inputs stay from their sample to the next, as a controller gives them; otherwise they go
+    // there in a straight line, as a driver turns the wheel. Asked only with `input_before`.
+    bool inputs_held = true;
 
     static ObserverForm corrected() { return {}; }
     bool operator==(const ObserverForm&) const = default;
@@ -50,6 +53,14 @@ struct ObserverInput {
     double steer_rad = 0.0;
     double stiffness_front_nprad = 0.0;
     double stiffness_rear_nprad = 0.0;
+
+    /// Half way to another. Of inputs that go there in a straight line over h the mean acts alike,
+    /// but for J h / 12 of what they change by; the first one leaves out half of that.
+    ObserverInput half_way(const ObserverInput& to) const {
+        return {0.5 * (force_x_n + to.force_x_n), 0.5 * (steer_rad + to.steer_rad),
+                0.5 * (stiffness_front_nprad + to.stiffness_front_nprad),
+                0.5 * (stiffness_rear_nprad + to.stiffness_rear_nprad)};
+    }
 };
 
 struct ObserverNoise {
@@ -78,7 +89,9 @@ class ObserverModel {
     /// covariance would overflow within seconds. The rates are sampled exactly there in any form.
     ObserverVec predict(const ObserverVec& x, const ObserverInput& before, const ObserverInput& now,
                         ObserverMat& A, bool unread = false) const {
-        const ObserverInput& u = form_.input_before ? before : now;
+        const ObserverInput u = !form_.input_before ? now
+                                : form_.inputs_held ? before
+                                                    : before.half_way(now);
         const Lateral c = lateral(x[0], u);
         Mat<3, 3> J;
         J << -car_.drag_nspm * per_mass_, 0.0, 0.0, 0.0, c.y_v, c.y_r - x[0], 0.0, c.n_v, c.n_r;

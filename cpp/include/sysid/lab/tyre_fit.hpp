@@ -17,8 +17,8 @@
 namespace sysid::lab {
 
 /// Both tyres and the terms of a_y, then what a known motion tells nothing of: factors of mass and
-/// yaw inertia, the drag area.
-enum TyreParameter : int { kP1 = 8, kP2 = 9, kP3 = 10, kTyreParameters = 14 };
+/// yaw inertia, the drag area, the friction ellipse.
+enum TyreParameter : int { kP1 = 8, kP2 = 9, kP3 = 10, kTyreParameters = 15 };
 
 /// One sample of a motion that is taken as known, and what the forces must explain.
 struct TyreSample {

@@ -4,6 +4,7 @@
 // (2008), doi:10.3888/tmj.11.1-5, is the filter with pseudo-noise; the others are held against it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -148,12 +149,22 @@ class CurveFilter {
 
         CurvePoint<n> at = curve_point<Curve>(slip, mean_);
         if (settings_.pseudo_noise) out.pseudo_variance = pseudo_noise<n>(at.hessian, P);
+        const double before = out.pseudo_variance;
         out.signal_before = at.gradient.dot(P * at.gradient);
-        const Mat<1, 1> R(settings_.noise_std * settings_.noise_std + out.pseudo_variance);
+        const double sensor = settings_.noise_std * settings_.noise_std;
 
         CurveVec<Curve> x = mean_;
         for (int i = 0; i < settings_.iterations; ++i) {
-            if (i > 0) at = curve_point<Curve>(slip, x);
+            if (i > 0) {
+                at = curve_point<Curve>(slip, x);
+                // What is left out there, about the new estimate. An odd reading may lead to where
+                // the curve is steep and bent: taken for straight there, it would leave a certainty
+                // that no later reading undoes.
+                if (settings_.pseudo_noise)
+                    out.pseudo_variance =
+                        std::max(before, pseudo_noise<n>(at.hessian, step.covariance));
+            }
+            const Mat<1, 1> R(sensor + out.pseudo_variance);
             CurveVec<Curve> next = mean_;
             CurveMat<Curve> covariance = P;
             const Vec<1> expected(at.mu + at.gradient.dot(mean_ - x));

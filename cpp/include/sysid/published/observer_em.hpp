@@ -6,7 +6,7 @@
 namespace sysid::lab {
 
 /// The published equations, with their defects.
-inline ObserverForm published_form() { return {false, false, false, false, false}; }
+inline ObserverForm published_form() { return {false, false, false, false, false, true}; }
 
 /// Learns Q and R as published: expectations from a smoother whose transition matrix is one sample
 /// late, moments of the model linearised at the smoothed states, with the inputs of the sample

@@ -129,6 +129,8 @@ class EMResult(Printed):
         Iterations that leapt ahead.
     samples : int
         Samples of all logs.
+    inputs_held : tuple of bool
+        Of each log whether its inputs are held from sample to sample: as told, or what is likelier.
     unmeasured : tuple of str
         Readings that no log has; their variance stayed as it was.
     """
@@ -141,6 +143,7 @@ class EMResult(Printed):
     fell: int
     leaps: int
     samples: int
+    inputs_held: tuple[bool, ...] = ()
     unmeasured: tuple[str, ...] = field(default=())
 
     @property
@@ -165,6 +168,7 @@ class EMResult(Printed):
             "log_likelihood": self.log_likelihood.tolist(),
             "converged": self.converged,
             "samples": self.samples,
+            "inputs_held": list(self.inputs_held),
             "unmeasured": list(self.unmeasured),
             "states": list(STATES),
             "readings": list(READINGS),
@@ -208,9 +212,13 @@ class EMResult(Printed):
         first, last = self.log_likelihood[[0, -1]]
         end = "converged" if self.converged else "not yet converged"
         fell = f"; it fell {self.fell} times" if self.fell else ""
+        held = {
+            "held until the next" if held else "straight to the next" for held in self.inputs_held
+        }
+        inputs = f"; inputs of each sample {held.pop()}" if len(held) == 1 else ""
         return (
             f"{self.iterations} iterations on {self.samples} samples: log-likelihood {first:.2f} "
-            f"-> {last:.2f}, {end}{fell}"
+            f"-> {last:.2f}, {end}{fell}{inputs}"
         )
 
     def _rows(self) -> list[tuple[str, str, str, str]]:
@@ -250,6 +258,29 @@ def _refuse_frozen(process: FloatArray, scale: Sequence[int]) -> None:
             )
 
 
+def _kinds(records: tuple[ObserverRecord, ...]) -> list[tuple[ObserverRecord, ...]]:
+    """The records as they are, or those that do not say it with inputs held, and moving."""
+    if all(record.inputs_held is not None for record in records):
+        return [records]
+    return [tuple(record.kinds()[-i] for record in records) for i in (0, 1)]
+
+
+def _learned(observer: Observer, records: Sequence[ObserverRecord], how: tuple[Any, ...]) -> Any:
+    noise = observer.noise
+    try:
+        return _core.learn_observer_noise(
+            [observer.core_log(record) for record in records],
+            as_float64(noise.process),
+            as_float64(noise.sensors),
+            *how,
+        )
+    except NumericalError as failure:
+        raise NumericalError(
+            f"learning the noise: {failure}; check units and stiffness, or start from larger "
+            "covariances"
+        ) from failure
+
+
 @doing("noise of the observer")
 def learn_observer_noise(
     observer: Observer,
@@ -287,6 +318,9 @@ def learn_observer_noise(
         Leaps ahead after every second step, where that gains (Varadhan & Roland, Scand. J.
         Statistics 2008). Variances that tend to zero take very long without it.
 
+    Where a record does not say whether its inputs are held, noise is learned with all of them held
+    and with all of them moving, and the likelier one is kept.
+
     Raises
     ------
     InvalidInput
@@ -305,24 +339,12 @@ def learn_observer_noise(
     sensor_form = (sensors or NoiseStructure()).core(READINGS)
     _refuse_too_little(several)
     _refuse_frozen(observer.noise.process, process_form[0])
-    logs = [observer.core_log(record) for record in several]
-    try:
-        found = _core.learn_observer_noise(
-            logs,
-            as_float64(observer.noise.process),
-            as_float64(observer.noise.sensors),
-            *process_form,
-            *sensor_form,
-            most,
-            float(tolerance),
-            never_fall,
-            accelerate,
-        )
-    except NumericalError as failure:
-        raise NumericalError(
-            f"learning the noise: {failure}; check units and stiffness, or start from larger "
-            "covariances"
-        ) from failure
+    most_of = (most, float(tolerance), never_fall, accelerate)
+    ways = [
+        (kind, _learned(observer, kind, (*process_form, *sensor_form, *most_of)))
+        for kind in _kinds(several)
+    ]
+    told, found = max(ways, key=lambda way: float(way[1]["log_likelihood"][-1]))
     readings = np.vstack([record.readings for record in several])
     return EMResult(
         noise=ObserverNoise(found["process"], found["sensors"]),
@@ -333,6 +355,7 @@ def learn_observer_noise(
         fell=found["fell"],
         leaps=found["leaps"],
         samples=len(readings),
+        inputs_held=tuple(record.inputs_held is not False for record in told),
         unmeasured=tuple(
             name for name, y in zip(READINGS, readings.T, strict=True) if not np.isfinite(y).any()
         ),

@@ -167,14 +167,24 @@ class Observer:
     @typed
     def log_likelihood(self, record: ObserverRecord) -> float:
         """Of the readings, by one pass of the filter."""
-        log = self.core_log(record)
-        return _numerical(
-            record.name, lambda: log.log_likelihood(self.noise.process, self.noise.sensors)
-        )
+        return max(self._log_likelihood(one) for one in record.kinds())
+
+    def _log_likelihood(self, record: ObserverRecord) -> float:
+        log, noise = self.core_log(record), self.noise
+        return _numerical(record.name, lambda: log.log_likelihood(noise.process, noise.sensors))
+
+    @typed
+    def told(self, record: ObserverRecord) -> ObserverRecord:
+        """The record with `inputs_held` said: as it was, or what is likelier under this noise."""
+        kinds = record.kinds()
+        return kinds[0] if len(kinds) == 1 else max(kinds, key=self._log_likelihood)
 
     @typed
     def core_log(self, record: ObserverRecord) -> _core.ObserverLog:
-        """Put the record into the core, with the state it starts from."""
+        """Put the record into the core, with the state it starts from.
+
+        Inputs of which it is not said count as held.
+        """
         speed = self.certain_start_mps
         if speed is not None:
             mean = as_float64([speed, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -194,11 +204,12 @@ class Observer:
             mean,
             covariance,
             speed is not None,
+            record.inputs_held is not False,
         )
 
     def _trace(self, record: ObserverRecord, *, smoothed: bool) -> StateEstimate:
-        log = self.core_log(record)
-        noise = self.noise
+        record = self.told(record)
+        log, noise = self.core_log(record), self.noise
         found = _numerical(record.name, lambda: log.trace(noise.process, noise.sensors, smoothed))
         return StateEstimate(
             name=record.name,

@@ -82,7 +82,7 @@ class ObserverRecord:
     rate_hz : float
         Sample rate.
     force_x_n, steer_rad : ndarray of shape (n,)
-        Longitudinal force and road-wheel steering angle, held over each sample.
+        Longitudinal force and road-wheel steering angle.
     stiffness_front_nprad, stiffness_rear_nprad : ndarray of shape (n,)
         Nominal cornering stiffness of the axles; a stiffness per load times the load.
     readings : ndarray of shape (n, 4)
@@ -90,6 +90,9 @@ class ObserverRecord:
         missing.
     name : str
         Name in messages.
+    inputs_held : bool, optional
+        Whether inputs are held from their sample to the next, as a digital controller holds them,
+        or go there in a straight line, as a driver turns the wheel. None: what is likelier.
     """
 
     rate_hz: float
@@ -99,6 +102,7 @@ class ObserverRecord:
     stiffness_rear_nprad: FloatArray
     readings: FloatArray
     name: str = "log"
+    inputs_held: bool | None = True
 
     @classmethod
     @typed
@@ -112,6 +116,7 @@ class ObserverRecord:
         stiffness_rear_nprad: npt.ArrayLike,
         readings: npt.ArrayLike,
         name: str = "log",
+        inputs_held: bool | None = True,
     ) -> ObserverRecord:
         """Check and convert; a single number stands for a constant input.
 
@@ -150,12 +155,17 @@ class ObserverRecord:
             refuse(np.isinf(y[:, i]), y[:, i], f"{name}: {key}", 1.0 / rate_hz, remedy)
         if not np.isfinite(y[:, 0]).any():
             raise InvalidInput(f"{name}: no reading of vx_mps; the observer needs the speed")
-        return cls(rate_hz=float(rate_hz), readings=y, name=name, **inputs)
+        return cls(rate_hz=float(rate_hz), readings=y, name=name, inputs_held=inputs_held, **inputs)
 
     @classmethod
     @typed
     def from_log(
-        cls, log: Log, car: ObserverCar, stiffness_prad: tuple[float, float]
+        cls,
+        log: Log,
+        car: ObserverCar,
+        stiffness_prad: tuple[float, float],
+        *,
+        inputs_held: bool | None = None,
     ) -> ObserverRecord:
         """Take readings and inputs of a log.
 
@@ -168,6 +178,8 @@ class ObserverRecord:
             For the loads at rest.
         stiffness_prad : (float, float)
             Nominal cornering stiffness per load of the front and the rear axle [1/rad].
+        inputs_held : bool, optional
+            As in `ObserverRecord`; if left out, what is likelier.
 
         Raises
         ------
@@ -198,6 +210,7 @@ class ObserverRecord:
             stiffness_rear_nprad=stiffness_prad[1] * loads[1],
             readings=np.column_stack([log[c] if log.has(c) else missing for c in READINGS]),
             name=log.name,
+            inputs_held=inputs_held,
         )
 
     @property
@@ -215,6 +228,12 @@ class ObserverRecord:
                 self.stiffness_rear_nprad,
             ]
         )
+
+    def kinds(self) -> tuple[ObserverRecord, ...]:
+        """The record itself, or where `inputs_held` is not said, with either."""
+        if self.inputs_held is not None:
+            return (self,)
+        return tuple(dataclasses.replace(self, inputs_held=held) for held in (True, False))
 
     @typed
     def without(self, *channels: str) -> ObserverRecord:

@@ -25,6 +25,9 @@ from .data import GreyBoxVehicle, TyreLog
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+ELLIPSE = "combined_slip.ellipse"
+"""Side force goes with sqrt(1 - ellipse (F_x / (D F_z))^2): 0 without combined slip, 1 a circle."""
+
 PARAMETERS = (
     *(f"{letter}_{axle}" for axle in AXLES for letter in "BCDE"),
     "P1",
@@ -33,6 +36,7 @@ PARAMETERS = (
     "mass_factor",
     "yaw_inertia_factor",
     "drag_area_m2",
+    ELLIPSE,
 )
 """All parameters of the grey-box car, in the core's order."""
 
@@ -54,6 +58,8 @@ NOISES = (
     "disturbed yaw rate [rad/s per root second]",
 )
 """Standard deviations that are learned, in the core's order."""
+
+TAKE_PROFILES = "take them from the profile likelihood (profiles=True, without --fast)"
 
 _CHI_SQUARE = 3.84  # 95 % quantile, one degree of freedom
 _KNOWN_WELL = 0.05  # relative standard error
@@ -86,7 +92,7 @@ class Rival:
 
     Attributes
     ----------
-    parameters : array, shape (14,)
+    parameters : array, shape (15,)
     lost : float
         By how much it is less likely than the best, in nats.
     covariance : array, shape (free, free)
@@ -123,7 +129,7 @@ class TyreFit(Estimated, Printed):
     ----------
     vehicle : GreyBoxVehicle
     logs : tuple of TyreLog
-    parameters : array, shape (14,)
+    parameters : array, shape (15,)
         All of `PARAMETERS`, free and fixed.
     estimates : tuple of Estimate
         The free ones.
@@ -139,6 +145,9 @@ class TyreFit(Estimated, Printed):
         Profile likelihoods of estimates and combinations; empty where none were asked for.
     rivals : tuple of Rival
         Other optima within the 95 % region, most often tyres of another curvature.
+    bent : tuple of str
+        What has an interval of the information matrix that is not to be trusted: the likelihood
+        does not fall as that says.
     """
 
     vehicle: GreyBoxVehicle
@@ -152,6 +161,7 @@ class TyreFit(Estimated, Printed):
     driven_rad: tuple[float, float]
     profiles: tuple[Profile, ...] = ()
     rivals: tuple[Rival, ...] = ()
+    bent: tuple[str, ...] = ()
 
     @typed
     def interval(self, name: str) -> tuple[float, float]:
@@ -159,8 +169,13 @@ class TyreFit(Estimated, Printed):
 
         It reaches over all `rivals`.
         """
-        low, high = next((f.interval for f in self.profiles if f.name == name), self[name].interval)
         what = self.quantities[name]
+        low, high = self[name].interval
+        for found in (f for f in self.profiles if f.name == name):
+            low, high = found.interval
+            if what.column is None:  # nothing bounds what follows from the coefficients
+                low = -np.inf if found.open_below else low
+                high = np.inf if found.open_above else high
         for rival in self.rivals:
             there = rival.interval(what, self.columns)
             low, high = min(low, there[0]), max(high, there[1])
@@ -212,7 +227,9 @@ class TyreFit(Estimated, Printed):
         return tuple(
             e.name
             for e in (*self.estimates, *self.derived)
-            if not e.note and self._half_width(e.name) < 2.0 * _KNOWN_WELL * abs(e.value)
+            if not e.note
+            and e.name not in self.bent
+            and self._half_width(e.name) < 2.0 * _KNOWN_WELL * abs(e.value)
         )
 
     def _half_width(self, name: str) -> float:
@@ -238,6 +255,7 @@ class TyreFit(Estimated, Printed):
             },
             "noise": dict(zip(NOISES, map(float, self.noise), strict=True)),
             "undetermined": list(self.undetermined),
+            "bent": list(self.bent),
             "correlation": {
                 "names": [e.name for e in self.estimates],
                 "matrix": self.correlation.tolist(),
@@ -329,6 +347,8 @@ class TyreFit(Estimated, Printed):
                 for e in self.estimates[:8]
             )
             lines.append(f"As likely to {number(rival.lost, 2)} nats: {values}")
+        if self.bent:
+            lines.append(f"Intervals not to be trusted: {', '.join(self.bent)}; {TAKE_PROFILES}")
         if self.undetermined:
             lines.append(
                 f"Not determined by this driving: {', '.join(self.undetermined)}; known to "

@@ -20,8 +20,10 @@ from ...identify.search.settle import bottom, descend, settle, settle_finely
 from ...identify.search.starts import Runner, Search, Starts, space_filling
 from ...identify.search.walk import alternate
 from ...vehicle import GRAVITY_MPS2, slip_angles
+from .bent import bent_of
+from .combined import asks_for_ellipse, warn_of_ellipse, with_ellipse
 from .data import GreyBoxVehicle, TyreLog
-from .fit import PARAMETERS, UNITS, Rival, TyreFit
+from .fit import ELLIPSE, PARAMETERS, UNITS, Rival, TyreFit
 from .motion import TyreMotion
 from .problem import box_of, first_point, free_parameters, objective_of, tyre_problem
 from .regression_search import descend_regression
@@ -41,6 +43,7 @@ def identify_tyres(
     *,
     start: Mapping[str, float] | None = None,
     residual_terms: bool = False,
+    combined_slip: bool | None = None,
     starts: int = 16,
     profiles: bool = True,
     method: str = "gauss-newton",
@@ -63,11 +66,16 @@ def identify_tyres(
         Starting values of some of `PARAMETERS`.
     residual_terms : bool
         Also fit P1, P2, P3 of a_y = ... + P1 v_x^2 + P2 v_y + P3 r.
+    combined_slip : bool, optional
+        Whether the force along the car costs side force, by a friction ellipse that is identified
+        too. If left out, the likelihood decides; where it cannot, and D depends on it, that is
+        warned of.
     starts : int
         The given point, and others that fill the whole `BOX` evenly.
     profiles : bool
         Take intervals from the profile likelihood, which follows bent valleys; otherwise from the
-        information matrix alone, which is quicker.
+        information matrix alone, which is quicker. What has such an interval that fails is told
+        (`TyreFit.bent`).
     method : str
         Local optimiser: `gauss-newton`, `nlopt` or `scipy`.
     seed : int
@@ -112,6 +120,9 @@ def identify_tyres(
     several, p, noise = _between_samples(
         vehicle, several, p, noise, box, residual_terms=residual_terms, method=method
     )
+    if combined_slip is not False:
+        few = objective_of(vehicle, several, _THINNED, residual_terms=residual_terms)
+        free, box, p, noise = _ellipse(few, free, box, p, noise, combined_slip, method)
     whole = objective_of(vehicle, several, residual_terms=residual_terms)
     for left in reversed(range(BETTER_FOUND)):
         passed, noise, _ = settle(whole, p, noise, box, method=method, parameters_first=True)
@@ -124,13 +135,31 @@ def identify_tyres(
             p = ahead.parameters
             continue
         if not profiles:
+            fit = replace(fit, bent=bent_of(fit, whole, box))
             break
         estimates, found, better = profiled_estimates(whole, p, noise, box, fit, workers, progress)
         fit = replace(fit, estimates=estimates, profiles=found)
         if better is None:
             break
         p = better
+    warn_of_ellipse(fit, whole, box)
     return fit
+
+
+def _ellipse(
+    objective: Objective,
+    free: tuple[str, ...],
+    box: Box,
+    p: FloatArray,
+    noise: FloatArray,
+    wanted: bool | None,
+    method: str,
+) -> tuple[tuple[str, ...], Box, FloatArray, FloatArray]:
+    """With the friction ellipse, where that is wanted or the likelihood asks for it."""
+    asked, p, noise = asks_for_ellipse(objective, p, noise, box, method)
+    if not (asked or wanted):
+        return free, box, p, noise
+    return (*free, ELLIPSE), with_ellipse(box), p, noise
 
 
 def _between_samples(
@@ -150,7 +179,8 @@ def _between_samples(
     """
     told = {log.inputs_held for log in logs} - {None}
     if len(told) == 1:
-        return tuple(replace(log, inputs_held=told.copy().pop()) for log in logs), p, noise
+        (held,) = told
+        return tuple(replace(log, inputs_held=held) for log in logs), p, noise
     found = []
     for held in (True, False):
         chosen = tuple(replace(log, inputs_held=held) for log in logs)

@@ -1,9 +1,9 @@
 """What is asked of the data: free parameters, where they are looked for, and the likelihood.
 
 The likelihood is that of the main job, of a model whose axle loads are logged and whose inputs are
-held from sample to sample where a digital controller gave them. Factors of mass and yaw inertia and
-the drag are effects of it, P1, P2 and P3 an effect of its own: a lateral force
-m (P1 v_x^2 + P2 v_y + P3 r) of the stated mass.
+held from sample to sample where a digital controller gave them. Factors of mass and yaw inertia,
+the drag and the friction ellipse are effects of it, P1, P2 and P3 an effect of its own: a lateral
+force m (P1 v_x^2 + P2 v_y + P3 r) of the stated mass.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ...identify.search.objective import Objective, gaussian_prior
 from ...identify.search.search import Box
 from ..observer.observed import READINGS
 from .data import SHORTEST, GreyBoxVehicle, TyreLog
-from .fit import PARAMETERS
+from .fit import ELLIPSE, PARAMETERS
 
 _TYRES = base_parameters()[:8]
 BOX: dict[str, tuple[float, float]] = {
@@ -35,10 +35,11 @@ BOX: dict[str, tuple[float, float]] = {
     "mass_factor": (0.5, 2.0),
     "yaw_inertia_factor": (0.3, 3.0),
     "drag_area_m2": (0.0, 10.0),
+    ELLIPSE: (0.0, 1.5),
 }
 """Where a search looks. Beyond E = 1 the curve would turn back to zero at large slip."""
 
-_CAR = {"mass_factor": 1.0, "yaw_inertia_factor": 1.0, "drag_area_m2": 0.5}
+_CAR = {"mass_factor": 1.0, "yaw_inertia_factor": 1.0, "drag_area_m2": 0.5, ELLIPSE: 0.0}
 GIVEN = {p.name: p.typical for p in _TYRES} | _CAR
 """Where a search begins that is told nothing."""
 
@@ -52,16 +53,16 @@ _SMALLEST = np.array([1e-4, 1e-4, 1e-5, 1e-4, 3e-5, 3e-5, 3e-5])
 _LARGEST = np.array([10.0, 10.0, 2.0, 20.0, 5.0, 5.0, 5.0])
 
 
-_FACTORS = ("mass", "yaw_inertia", "aero_drag")  # of the last three parameters
+_EFFECTS = ("mass", "yaw_inertia", "aero_drag", "combined_slip")  # of the last four parameters
 _TERMS = ("P1", "P2", "P3")
 _COLUMNS = np.array(  # of all parameters in the core's vector
     [
         *range(8),
         *(_core.USER_OFFSET + i for i in range(len(_TERMS))),
-        *(effect(name).columns[0] for name in _FACTORS),
+        *(effect(name).columns[0] for name in _EFFECTS),
     ]
 )
-_NULL = np.array([0.0] * (len(PARAMETERS) - 3) + [1.0, 1.0, 0.0])
+_NULL = np.array([0.0] * (len(PARAMETERS) - 4) + [1.0, 1.0, 0.0, 0.0])
 _YAW_INERTIA = 8  # place in the core's vector
 _CHANNELS = [MEASURED.index(name) for name in READINGS]
 # Of the core's noise parameters those that are learned: sensors, and what disturbs the motion.
@@ -143,7 +144,7 @@ class TyreProblem:
             "P1 to P3",
         )
         mask = 0
-        for name in _FACTORS:
+        for name in _EFFECTS:
             mask |= effect(name).bit
         own: tuple[Any, ...] = (0, [], ((TARGETS.index("force_y"), terms.steps),), [])
         users = [own] if residual_terms else []

@@ -20,7 +20,7 @@ from ..._common.typed import typed
 from ...errors import InvalidInput
 from ..observer.observed import READINGS
 from .data import GreyBoxVehicle, TyreLog
-from .fit import NOISES, PARAMETERS, TyreFit
+from .fit import ELLIPSE, NOISES, PARAMETERS, TyreFit
 from .problem import TyreProblem, tyre_problem
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ class IdentifiedCar:
     Parameters
     ----------
     vehicle : GreyBoxVehicle
-    parameters : array, shape (14,)
-        In the order of `lab.tyre_fit.PARAMETERS`.
+    parameters : array, shape (15,)
+        In the order of `lab.tyre_fit.PARAMETERS`; the friction ellipse may be left out.
     noise : array, shape (7,)
         In the order of `lab.tyre_fit.NOISES`.
     """
@@ -43,6 +43,11 @@ class IdentifiedCar:
     vehicle: GreyBoxVehicle
     parameters: FloatArray
     noise: FloatArray
+
+    def __post_init__(self) -> None:
+        known = as_float64(self.parameters)
+        if known.shape == (len(PARAMETERS) - 1,):  # from before there was an ellipse
+            object.__setattr__(self, "parameters", as_float64(np.append(known, 0.0)))
 
     @classmethod
     @typed
@@ -64,7 +69,10 @@ class IdentifiedCar:
             told = json.loads(read_text(path))
             return cls(
                 GreyBoxVehicle(**told["vehicle"]),
-                as_float64([told["parameters"][name] for name in PARAMETERS]),
+                as_float64(
+                    [told["parameters"][name] for name in PARAMETERS[:-1]]
+                    + [told["parameters"].get(ELLIPSE, 0.0)]
+                ),
                 as_float64([told["noise"][name] for name in NOISES]),
             )
         except (KeyError, TypeError, ValueError) as error:

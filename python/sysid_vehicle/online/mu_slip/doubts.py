@@ -22,6 +22,12 @@ _ROUNDS = 100  # of a fit
 _FIRST = 0.01  # of the readings' range: the offset that is tried first
 _LARGEST_CONDITION = 1e14
 _STEP = 1e-5  # of slip, for the slope of a curve
+_TWICE = 1.5  # by how much squares of differences that share a reading scatter more
+_NOISY = (
+    "slip: readings scatter more where the curve is steep, as noise of about {noise:.2g} in it "
+    "makes them: values are off by more than their standard deviation, which takes it as free of "
+    "noise; filter or smooth the wheel speed"
+)
 _CAUSES = {
     "slip": "the speed or the rolling radius was told wrong by {share:.2g} %",
     "mu": "a slope of the road, drag, or an offset of the sensor is in it",
@@ -42,6 +48,9 @@ class _Shifted:
     @property
     def squares(self) -> float:
         return float(self.left @ self.left)
+
+    def moved(self, slip: FloatArray) -> FloatArray:
+        return slip - self.offset if self.channel == "slip" else slip
 
     def text(self, curve: MuSlipCurve) -> str:
         values = (f"{n} {x:.4g}" for n, x in zip(curve.parameters[:2], self.values, strict=False))
@@ -66,10 +75,24 @@ def doubts(data: MuSlipData, found: MuSlipEstimate) -> list[str]:
         return []
     over_slip = _alike(error[np.argsort(slip, kind="stable")])
     shifted = () if found.at_bound else _shifted(found, slip, mu)
+    best = shifted[0] if shifted else None
+    noise = (
+        _noise_of_slip(found.curve, slip, found.values, error)
+        if best is None
+        else _noise_of_slip(found.curve, best.moved(slip), best.values, best.left)
+    )
+    notes = []
+    if noise > 0.0:
+        notes = [_NOISY.format(noise=noise)]
+        # An offset that noise in the slip may look like is not told beside it.
+        reach = {"slip": noise, "mu": noise * _steepest(found, slip)}
+        shifted = tuple(one for one in shifted if abs(one.offset) > reach[one.channel])
     if shifted and not _other_curve_is_better(data, found.curve, shifted[0]):
         text = "; as likely, ".join(one.text(found.curve) for one in shifted)
         note = "; take it off, values here are off by more than their standard deviation"
-        return [text + note]
+        return [*notes, text + note]
+    if notes:
+        return notes
     if over_slip < USUAL.strict:
         others = [c.name for c in (TWO_PARAMETER, MAGIC_FORMULA) if c is not found.curve]
         note = (
@@ -87,6 +110,36 @@ def doubts(data: MuSlipData, found: MuSlipEstimate) -> list[str]:
         )
         return [note]
     return _noise_told(data.noise_std, error, len(found.values))
+
+
+def _noise_of_slip(
+    curve: MuSlipCurve, slip: FloatArray, values: FloatArray, left: FloatArray
+) -> float:
+    """Standard deviation of noise in the slip, where the readings show some; else zero.
+
+    It makes readings scatter with the slope of the curve: R. Koenker's test, J. Econometrics 17
+    (1981), p. 107. Neighbours over the slip are compared: what else bends the readings is the same
+    in both.
+    """
+    order = np.argsort(slip, kind="stable")
+    steep = _over_slip(curve, slip[order], values) ** 2
+    squares = 0.5 * np.diff(left[order]) ** 2
+    of = 0.5 * (steep[1:] + steep[:-1])
+    away, swing = of - of.mean(), squares - squares.mean()
+    slope = float(away @ swing) / max(float(away @ away), 1e-300)
+    explained = slope * float(away @ swing) / max(float(swing @ swing), 1e-300)
+    p_value = 0.5 * math.erfc(math.sqrt(0.5 * squares.size * explained / _TWICE))
+    return math.sqrt(slope) if slope > 0.0 and p_value < USUAL.strict else 0.0
+
+
+def _over_slip(curve: MuSlipCurve, slip: FloatArray, values: FloatArray) -> FloatArray:
+    """Derivative of the curve by the slip."""
+    after, before = (curve.mu(slip + side * _STEP, values) for side in (1.0, -1.0))
+    return as_float64((after - before) / (2.0 * _STEP))
+
+
+def _steepest(found: MuSlipEstimate, slip: FloatArray) -> float:
+    return float(np.abs(_over_slip(found.curve, slip, found.values)).max())
 
 
 def _alike(left: FloatArray) -> float:
@@ -144,13 +197,25 @@ def _shifted(found: MuSlipEstimate, slip: FloatArray, mu: FloatArray) -> tuple[_
         information = slope.T @ slope
         fits = _alike(left[np.argsort(slip, kind="stable")]) >= USUAL.strict
         if fits and np.linalg.cond(information) < _LARGEST_CONDITION:
-            variance = shifted / freedom * np.linalg.inv(information)[-1, -1]
-            result.append(
-                _Shifted(channel, offset, math.sqrt(variance), values, as_float64(left), p_value)
-            )
+            inverse = np.linalg.inv(information)
+            std = math.sqrt(shifted / freedom * inverse[-1, -1])
+            # Readings that count for much and scatter more than others say less than they seem to.
+            std = max(std, _uneven_std(slope, as_float64(inverse), as_float64(left)))
+            if math.erfc(abs(offset) / std / math.sqrt(2.0)) < USUAL.strict:
+                result.append(_Shifted(channel, offset, std, values, as_float64(left), p_value))
     result.sort(key=lambda one: one.squares)
     least = result[0].squares if result else 0.0
     return tuple(r for r in result if freedom * math.log(r.squares / least) < HALF_95**2)
+
+
+def _uneven_std(slope: FloatArray, inverse: FloatArray, left: FloatArray) -> float:
+    """Standard deviation of the last parameter under noise of another size at every reading.
+
+    J. G. MacKinnon & H. White, J. Econometrics 29 (1985), p. 305: the estimate called HC3.
+    """
+    share = slope @ inverse[:, -1]
+    leverage = np.einsum("ni,ij,nj->n", slope, inverse, slope)
+    return math.sqrt(float(np.sum((share * left / (1.0 - leverage).clip(0.01)) ** 2)))
 
 
 def _other_curve_is_better(data: MuSlipData, curve: MuSlipCurve, shifted: _Shifted) -> bool:
@@ -182,5 +247,4 @@ def _slopes(curve: MuSlipCurve, slip: FloatArray, values: FloatArray, channel: s
     own = curve.points(slip, values)[1]
     if channel == "mu":
         return np.hstack([own, np.ones((slip.size, 1))])
-    after, before = (curve.mu(slip + side * _STEP, values) for side in (1.0, -1.0))
-    return np.hstack([own, ((before - after) / (2.0 * _STEP))[:, None]])
+    return np.hstack([own, -_over_slip(curve, slip, values)[:, None]])
