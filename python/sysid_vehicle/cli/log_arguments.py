@@ -118,3 +118,19 @@ def written_map(log: Path, to: Path | None, dbc: Path | None, vehicle: Vehicle |
             "nothing else tells how the car is driven and braked"
         )
     return found
+
+
+def add_time_limit(parser: argparse.ArgumentParser, help: str) -> None:
+    """Ask for the seconds after which a command ends."""
+    parser.add_argument("--time-limit", type=_seconds, metavar="S", help=help)
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise ValueError
+    return value
+
+
+# argparse says "invalid NAME value".
+_seconds.__name__ = "seconds (above 0)"
