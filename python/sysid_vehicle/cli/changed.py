@@ -55,9 +55,8 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     else:
         reference = maximised(model, Driving.of(before), starts=12, ends=began + _FITTED * limit)
         if not reference.converged:
-            warn(
-                "the time limit left out the likeliest parameters of the reference, and what they lack may look like a change"
-            )
+            left_out = "the likeliest parameters of the reference"
+            warn(f"the time limit left out {left_out}: what they lack may look like a change")
         left = began + _COMPARED * limit - time.perf_counter()
         found = changed(reference, after, vehicle=later, time_limit_s=max(left, 1e-9))
     print(found)
