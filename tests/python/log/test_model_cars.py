@@ -5,6 +5,7 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
+import model_cars
 import numpy as np
 import pytest
 
@@ -121,3 +122,42 @@ def test_a_quick_model_car_needs_little_force() -> None:
     assert "fx_n" in Log.from_arrays(log, vehicle=car).channels
     with pytest.raises(sv.InvalidInput, match=r"fx_n: .* of a model car, read the log with its"):
         Log.from_arrays(log)
+
+
+@pytest.fixture(scope="module")
+def slow() -> Log:
+    """A model car of 2.3 kg in a yard, always below 5 m/s."""
+    model = sv.Model(model_cars.car())
+    return sv.drive(model, sv.manoeuvres.lap(60.0, 3.0, 4.5), seed=1, rate_hz=100.0)
+
+
+@pytest.mark.parametrize(
+    ("leave_out", "told"),
+    [((), "mass_kg = 900, but fx_n moves the car as if it had 2.3"), (("fx_n",), "wheelbase of")],
+)
+def test_a_slow_model_car_is_not_one_of_900_kg(
+    slow: Log, leave_out: tuple[str, ...], told: str
+) -> None:
+    """A full-size car at its speeds turns by its wheelbase; this one never drives so fast."""
+    log = slow.without(*leave_out) if leave_out else slow
+    with pytest.raises(sv.InvalidInput, match=re.escape(told)) as error:
+        check_car(log, mass_kg=900.0, wheelbase_m=2.4)
+    assert "the vehicle file is that of another car" in str(error.value)
+    car = model_cars.car()
+    check_car(log, mass_kg=car.mass_kg, wheelbase_m=car.wheelbase_m)
+
+
+@pytest.mark.parametrize("slope_rad", [0.0, 0.03])
+def test_a_car_that_only_manoeuvres_slowly_is_itself(slope_rad: float) -> None:
+    """On hills, too: below 5 m/s no more than magnitudes are told."""
+    car = sv.example_vehicle()
+    for seed in range(4):
+        log = sv.drive(
+            sv.Model(car),
+            sv.manoeuvres.lap(60.0, 1.5, 4.0),
+            seed=seed,
+            rate_hz=50.0,
+            disturbance=sv.RoadDisturbance(slope_rad=slope_rad),
+        )
+        for few in (log, log.without("fx_n")):
+            check_car(few, mass_kg=car.mass_kg, wheelbase_m=car.wheelbase_m)
