@@ -128,7 +128,7 @@ def test_a_quick_model_car_needs_little_force() -> None:
 def slow() -> Log:
     """A model car of 2.3 kg in a yard, always below 5 m/s."""
     model = sv.Model(model_cars.car())
-    return sv.drive(model, sv.manoeuvres.lap(60.0, 3.0, 4.5), seed=1, rate_hz=100.0)
+    return sv.drive(model, sv.manoeuvres.lap(60.0, 4.0, 4.5), seed=1, rate_hz=100.0)
 
 
 @pytest.mark.parametrize(
