@@ -35,6 +35,7 @@ from .change.saying import Saying
 from .change.search import Search
 from .diagnose import diagnose
 
+_ASKED = 0.3  # of the time that is left, for what the reference lacks
 _LACKS = 2  # effects that are put into the model of a reference, at most
 
 
@@ -166,11 +167,11 @@ def _named_in(search: Search, candidates: Sequence[str | Effect] | None) -> Effe
 
     A delay of the steering beside a compliance that the model lacks is likelier a lag.
     """
-    in_time = search.in_time
+    part = search.in_time.part(_ASKED)
     ask = partial(diagnose, search.before, candidates=candidates, rules=search.rules)
-    found = in_time.of(partial(ask, time_limit_s=in_time.left_s), None)
-    if found is None or in_time.over:
-        in_time.reference = True
+    found = part.of(partial(ask, time_limit_s=part.left_s), None)
+    if found is None or part.over:
+        search.in_time.reference = True
         return None
     if found.named is None:
         return None

@@ -1,5 +1,6 @@
 """A comparison that has no time to be finished, and one that does not waste it."""
 
+import time
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -85,6 +86,15 @@ def test_what_was_not_tried_in_the_place_of_a_name_stands_in_its_group(
     tried = {e for put in done[: done.index(("mass",)) + 1] for e in put}
     assert set(mass.group) - tried
     assert found.causes.inclusion["mass"] < 0.9
+
+
+def test_what_the_reference_lacks_has_a_share_of_the_time_alone() -> None:
+    """The comparison itself would have none left."""
+    whole = InTime(time.perf_counter() + 100.0)
+    part = whole.part(0.3)
+    assert part.left_s == pytest.approx(30.0, abs=1.0)
+    assert whole.left_s == pytest.approx(100.0, abs=1.0)
+    assert InTime().part(0.3).left_s is None
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), True])

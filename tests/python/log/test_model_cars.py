@@ -89,7 +89,7 @@ def test_a_force_in_kn_moves_no_car_of_usual_length() -> None:
 
 
 def test_of_a_model_car_with_the_file_of_another_one_its_own_file_is_asked_for() -> None:
-    """In thousands of newtons 2.3 kg would be 2300 kg: the file of 900 kg is wrong, not the unit."""
+    """In thousands of newtons 2.3 kg would be 2300 kg: not the unit need be wrong."""
     with pytest.raises(sv.InvalidInput, match="of a model car, give its own vehicle file"):
         Log.from_arrays(driven(2.3), vehicle=sv.example_vehicle())
 

@@ -49,6 +49,11 @@ class InTime:
         """Seconds that are left, above zero; None where there is no end."""
         return None if self.ends == math.inf else max(self.ends - time.perf_counter(), 1e-9)
 
+    def part(self, share: float) -> InTime:
+        """A share of the time that is left, for one question beside others."""
+        left = self.left_s
+        return InTime() if left is None else InTime(time.perf_counter() + share * left)
+
     def of(self, work: Callable[[], R], otherwise: R) -> R:
         """What work gives, or something else if it is not done in time."""
         return before(self.ends, work, otherwise)
