@@ -16,6 +16,7 @@ import numpy.typing as npt
 from . import _core
 from ._common.arrays import FloatArray
 from ._common.files import as_path, read_toml, refuse_unknown, write_text
+from ._common.kinds import VEHICLE
 from ._common.typed import typed, typed_fields
 from .errors import InvalidInput, warn
 from .tyre import TYRE_RANGES, USUAL_TYRE, Range, Tyre, check_ranges
@@ -189,7 +190,7 @@ class Vehicle:
             If ``yaw_inertia_kgm2`` is absent, because it then has to be identified, or the table
             of a tyre, because the search then begins at that of `Tyre`.
         """
-        content = read_toml(path)
+        content = read_toml(path, VEHICLE)
         where = str(path)
         name = content.pop("name", as_path(path).name.split(".")[0])
         if not isinstance(name, str):

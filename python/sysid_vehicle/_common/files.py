@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InvalidInput, near_names
+from .kinds import EMPTY, REMEDIES, kind_of
 from .replace import could_replace, replace_file
 
 if sys.version_info >= (3, 11):
@@ -78,14 +79,18 @@ def read_text(path: str | Path) -> str:
         return raw.decode("latin-1")
 
 
-def read_toml(path: str | Path) -> dict[str, Any]:
-    """Return the content of a TOML file.
+def read_toml(path: str | Path, wanted: str) -> dict[str, Any]:
+    """Return the content of a TOML file of a kind (`kinds.py`).
 
     Raises
     ------
     InvalidInput
-        If the file cannot be read or is not TOML; the message gives line and column.
+        If the file cannot be read, is of another kind, or is not TOML; the message then gives line
+        and column.
     """
+    kind = kind_of(read_bytes(path))
+    if kind not in ("", EMPTY, wanted):
+        raise InvalidInput(f"{path}: is {kind}, not {wanted}; {REMEDIES[wanted]}")
     text = read_text(path)
     try:
         return tomllib.loads(text)
@@ -95,6 +100,22 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InvalidInput(
             f"{path}: not a TOML file: its brackets are nested too deeply; flatten them"
         ) from None
+
+
+def read_json(path: str | Path, wanted: str) -> dict[str, Any]:
+    """Return the content of a JSON file of a kind (`kinds.py`).
+
+    Raises
+    ------
+    InvalidInput
+        If the file cannot be read or is of another kind.
+    """
+    raw = read_bytes(path)
+    kind = kind_of(raw)
+    if kind != wanted:
+        raise InvalidInput(f"{path}: is {kind or 'no JSON'}, not {wanted}; {REMEDIES[wanted]}")
+    told: dict[str, Any] = json.loads(raw)
+    return told
 
 
 def write_text(path: str | Path, text: str) -> None:

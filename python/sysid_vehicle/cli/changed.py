@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import time
 from pathlib import Path
 
 from ..diagnose import changed
+from ..errors import warn
+from ..estimate import Driving
 from ..identify import identify
+from ..identify.identify import maximised
 from ..model import Model
 from ..vehicle import Vehicle
-from .log_arguments import LOG_HELP, add_driving, add_effects, read_logs
+from .log_arguments import LOG_HELP, add_driving, add_effects, add_time_limit, read_logs
 from .outputs import add_json, write_figures
+
+_FITTED, _COMPARED = 0.3, 0.85  # shares of a time limit, at whose ends they are done
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -29,15 +35,29 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="vehicle file of the later drives, where it is another one",
     )
     add_effects(parser)
+    add_time_limit(
+        parser,
+        "end after S seconds, but for some passes over the data: the fit of the earlier drives and "
+        "the comparison have a share each, and what was left out is said",
+    )
     add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Fit the earlier drives, compare the later ones with them, print, write."""
+    began, limit = time.perf_counter(), args.time_limit
     model = Model(Vehicle.from_toml(args.vehicle), args.effects)
     later = None if args.vehicle_after is None else Vehicle.from_toml(args.vehicle_after)
     before = read_logs(args.logs, args, model.vehicle)
     after = read_logs(args.after, args, later or model.vehicle)
-    found = changed(identify(model, before), after, vehicle=later)
+    if limit is None:
+        found = changed(identify(model, before), after, vehicle=later)
+    else:
+        reference = maximised(model, Driving.of(before), starts=12, ends=began + _FITTED * limit)
+        if not reference.converged:
+            left_out = "the likeliest parameters of the reference"
+            warn(f"the time limit left out {left_out}: what they lack may look like a change")
+        left = began + _COMPARED * limit - time.perf_counter()
+        found = changed(reference, after, vehicle=later, time_limit_s=max(left, 1e-9))
     print(found)
     write_figures(args.json, found.to_dict(), heard)

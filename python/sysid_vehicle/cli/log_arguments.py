@@ -9,6 +9,7 @@ from pathlib import Path
 
 from .._common.files import read_text, write_text
 from .._common.progress import note
+from ..effects.user import refuse_no_program
 from ..errors import InvalidInput, warn
 from ..log import Log
 from ..read import ChannelMap, Proposal, propose_channels, read_log
@@ -18,7 +19,14 @@ LOG_HELP = "log of one run: CSV, MDF, MCAP, ROS bag, .mat, .vbo, CAN log, Parque
 
 
 def say_it_runs(path: Path) -> None:
-    """Say that a user's file is a program: it can do whatever the user can."""
+    """Say that a user's file is a program: it can do whatever the user can.
+
+    Raises
+    ------
+    InvalidInput
+        It is another kind of file.
+    """
+    refuse_no_program(path)
     note(f"sysid-vehicle: runs {path} as a Python program, with all your rights")
 
 
@@ -118,3 +126,19 @@ def written_map(log: Path, to: Path | None, dbc: Path | None, vehicle: Vehicle |
             "nothing else tells how the car is driven and braked"
         )
     return found
+
+
+def add_time_limit(parser: argparse.ArgumentParser, help: str) -> None:
+    """Ask for the seconds after which a command ends."""
+    parser.add_argument("--time-limit", type=_seconds, metavar="S", help=help)
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise ValueError
+    return value
+
+
+# argparse says "invalid NAME value".
+_seconds.__name__ = "seconds (above 0)"

@@ -8,7 +8,15 @@ from pathlib import Path
 from .. import _core
 from ..demo import DEFAULT, RANDOM
 from . import changed, fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
-from .log_arguments import LOG_HELP, add_define, add_driving, add_effects, add_level, names
+from .log_arguments import (
+    LOG_HELP,
+    add_define,
+    add_driving,
+    add_effects,
+    add_level,
+    add_time_limit,
+    names,
+)
 from .outputs import add_json, add_output
 
 _MARKDOWN = (".md",)  # in which a study may be reported too
@@ -124,11 +132,9 @@ def _search(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="add at most N effects (default 6)",
     )
-    parser.add_argument(
-        "--time-limit",
-        type=_seconds,
-        metavar="S",
-        help="end after S seconds, with what is printed and the report: every stage has a share of "
+    add_time_limit(
+        parser,
+        "end after S seconds, with what is printed and the report: every stage has a share of "
         "them, and what was left out is said",
     )
     parser.add_argument(
@@ -160,15 +166,7 @@ def _sizes(text: str) -> dict[str, str]:
     return {name.strip(): size.strip() for name, size in pairs}
 
 
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise ValueError
-    return value
-
-
 # argparse says "invalid NAME value".
 _seed.__name__ = "seed (0 or more)"
 _count.__name__ = "number (0 or more)"
 _sizes.__name__ = "sizes (yaw_rate=0.5deg/s,...)"
-_seconds.__name__ = "seconds (above 0)"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import json
+import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,8 +11,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from .._common.files import read_text
+from .._common.arguments import real
+from .._common.files import read_json
+from .._common.kinds import GAINS
 from .._common.style import new_figure
+from .._common.text import few
 from ..errors import InvalidInput
 from ..published import (
     LoadExperiment,
@@ -299,12 +302,20 @@ def _validate(args: argparse.Namespace) -> dict[str, Any]:
 
 def _gains(path: Path) -> tuple[str, dict[str, float]]:
     """Law and gains out of what `calibrate --json` wrote."""
-    try:
-        content = json.loads(read_text(path))
-        law, found = str(content["law"]), {k: float(v) for k, v in content["gains"].items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InvalidInput(f"{path}: not a file of `twin calibrate --json`: {error!r}") from error
-    box = BENCHMARK_BOX if law == _BENCHMARK else TWIN_BOX.get(_LAWS.get(law, ""))
-    if box is None or set(found) != set(box.ranges):
-        raise InvalidInput(f"{path}: these are no gains of --law {law}; calibrate again")
-    return law, found
+    content = read_json(path, GAINS)
+    law, given = content["law"], content["gains"]
+    known = {name: TWIN_BOX[of] for name, of in _LAWS.items() if of in TWIN_BOX}
+    known[_BENCHMARK] = BENCHMARK_BOX
+    if not isinstance(law, str) or law not in known:
+        told = few(list(known))
+        raise InvalidInput(f"{path}: law = {law!r}; calibrated are {told}: calibrate again")
+    if not isinstance(given, dict) or set(given) != set(known[law].ranges):
+        told = ", ".join(known[law].ranges)
+        raise InvalidInput(f"{path}: --law {law} has the gains {told}; calibrate again")
+    found = {name: real(value) for name, value in given.items()}
+    for name, value in found.items():
+        if value is None or not 0.0 < value < math.inf:
+            raise InvalidInput(
+                f"{path}: gains.{name} = {given[name]!r}; give a number above 0, or calibrate again"
+            )
+    return law, {name: value for name, value in found.items() if value is not None}

@@ -9,11 +9,14 @@ the exact likelihoods decide between what was fitted.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from .._common.arguments import duration
 from .._common.text import few
 from .._common.typed import typed
 from ..effects import Effect
@@ -26,11 +29,13 @@ from ..model import Model
 from ..rules import USUAL, Rules
 from ..vehicle import Vehicle
 from .change.change import Change
+from .change.in_time import InTime
 from .change.may_change import YAW_INERTIA
 from .change.saying import Saying
 from .change.search import Search
 from .diagnose import diagnose
 
+_ASKED = 0.3  # of the time that is left, for what the reference lacks
 _LACKS = 2  # effects that are put into the model of a reference, at most
 
 
@@ -43,6 +48,7 @@ def changed(
     vehicle: Vehicle | None = None,
     candidates: Sequence[str | Effect] | None = None,
     rules: Rules = USUAL,
+    time_limit_s: float | None = None,
 ) -> Change:
     """Tell what of a car changed since a reference: yesterday's log fits the model, today's not.
 
@@ -68,6 +74,12 @@ def changed(
         Those with a moment of their own, as a drop of grip, belong to one driving and are left out.
     rules : Rules
         By which changes are claimed.
+    time_limit_s : float, optional
+        After so many seconds the comparison ends, wherever it is, but for some passes over the
+        data: about as long as `compare` and a few scorings of all effects take. What was not
+        fitted by then is not named, nor called unchanged, and where it was to be tried in the place
+        of what is named, it stands in the group of that. A warning and `Change.late_facts` tell
+        what was left out.
 
     Returns
     -------
@@ -83,8 +95,10 @@ def changed(
     Warns
     -----
     SysidWarning
-        A log is of the reference and of the later driving, with one vehicle file.
+        A log is of the reference and of the later driving, with one vehicle file; or the time
+        limit left something out.
     """
+    ends = time.perf_counter() + duration(time_limit_s, "time_limit_s")
     if before.horizon_s:
         raise InvalidInput(
             f"the reference is a fit to predictions {before.horizon_s:g} s ahead, and evidence is "
@@ -105,12 +119,21 @@ def changed(
         warn(f"{few(both)} {'is' if len(both) == 1 else 'are'} {told}")
     lacks: list[str] = []
     while True:
-        search = Search(before, _later(before, driving, vehicle), candidates, rules)
+        in_time = InTime(ends)
+        search = Search(before, _later(before, driving, vehicle), candidates, rules, in_time)
         found = _compared(search, candidates, may_lack=len(lacks) < _LACKS)
-        if isinstance(found, Change):
-            return replace(found, lacks=tuple(lacks))
-        lacks.append(found.id)
-        before = identify(before.model.add(found), before.driving, starts=1)
+        if not isinstance(found, Change):
+            work = partial(identify, before.model.add(found), before.driving, starts=1)
+            own = in_time.of(work, None)
+            if own is not None:
+                lacks.append(found.id)
+                before = own
+                continue
+            in_time.reference = True
+            found = Saying(search).change()
+        if found.late_facts:
+            warn(f"the time limit ended the comparison: {'; '.join(found.late_facts)}")
+        return replace(found, lacks=tuple(lacks))
 
 
 def _compared(
@@ -126,25 +149,30 @@ def _compared(
     like = search.alike.beyond <= search.rules.taken
     first = like or search.nothing(search.singles) <= 1.0 - search.rules.credible
     if may_lack and first:
-        lack = _named_in(search.before, candidates, search.rules)
+        lack = _named_in(search, candidates)
         if lack is not None:
             return lack
     said = Saying(search)
     change = said.change()
     lack = said.lack() if may_lack and not change.calm else None
     if may_lack and not (change.calm or first or lack):
-        lack = _named_in(search.before, candidates, search.rules)
+        lack = _named_in(search, candidates)
+        if search.in_time.reference:
+            change = said.change()
     return change if lack is None else lack
 
 
-def _named_in(
-    before: Fit, candidates: Sequence[str | Effect] | None, rules: Rules
-) -> Effect | None:
+def _named_in(search: Search, candidates: Sequence[str | Effect] | None) -> Effect | None:
     """The one effect that the reference alone shows to be missing: it bends what is beside it.
 
     A delay of the steering beside a compliance that the model lacks is likelier a lag.
     """
-    found = diagnose(before, candidates=candidates, rules=rules)
+    part = search.in_time.part(_ASKED)
+    ask = partial(diagnose, search.before, candidates=candidates, rules=search.rules)
+    found = part.of(partial(ask, time_limit_s=part.left_s), None)
+    if found is None or part.over:
+        search.in_time.reference = True
+        return None
     if found.named is None:
         return None
     group = found.causes.of(found.named.id)

@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .._common.arguments import expect
+from .._common.files import read_bytes
+from .._common.kinds import EMPTY, TABLE, kind_of
 from .._common.typed import typed
 from ..errors import InvalidInput
 from . import plugins
@@ -324,6 +326,7 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     path = Path(path)
     if not path.exists() and any(p.id == str(path) for p in plugins.installed_effects()):
         return (effect(str(path)),)
+    refuse_no_program(path)
     before = [*catalogue()]
     try:
         runpy.run_path(str(path))
@@ -335,6 +338,23 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     if not found:
         raise InvalidInput(f"{path}: it defines no effect; call sysid_vehicle.define_effect in it")
     return found
+
+
+def refuse_no_program(path: Path) -> None:
+    """Refuse what cannot be a Python file that defines effects, before it is run.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    wanted = "not a Python file that defines effects"
+    if path.is_dir():
+        if not (path / "__main__.py").exists():
+            raise InvalidInput(f"{path}: is a folder, {wanted}; give the file")
+        return
+    kind = kind_of(read_bytes(path))
+    if kind not in ("", EMPTY, TABLE, "a ZIP archive"):
+        raise InvalidInput(f"{path}: is {kind}, {wanted}; give the file")
 
 
 def _read(formulas: Mapping[str, Formula], channels: Mapping[str, object]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from .._common.files import as_path, read_toml, refuse_unknown
+from .._common.kinds import MANIFEST
 from ..errors import InvalidInput
 from ..model import Model
 from ..read import ChannelMap
@@ -26,7 +27,7 @@ def manifest_jobs(path: str | Path) -> list[Job]:
         The file or a vehicle file cannot be read, a key is unknown, or no log matches.
     """
     path = as_path(path)
-    told = read_toml(path)
+    told = read_toml(path, MANIFEST)
     refuse_unknown(told, (*_SHARED, "logs", "define", "improve", "study"), str(path))
     options = told.get("improve", {})
     if not isinstance(options, dict):

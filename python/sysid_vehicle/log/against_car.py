@@ -24,6 +24,8 @@ from .log import Log
 
 _MOVING = 5.0  # m/s, with a wheelbase of `_USUAL_M`: slip and curvature are alike at like v^2 / L
 _USUAL_M = 2.6
+_LEAST_M = 0.1  # the shortest wheelbase
+_MAGNITUDE = 4.0
 _MIN_WINDOWS = 12
 _FEWEST = 4  # windows in which the car brakes
 _SETTLING = 1  # windows before and after harder driving
@@ -98,9 +100,33 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float, lf_m: float | Non
     drive = _driven(motion, wheelbase_m)
     if drive is not None:
         _check_numbers(log, drive, mass_kg, wheelbase_m)
+    elif (slow := _driven(motion, _LEAST_M)) is not None:
+        _check_magnitudes(log, slow, mass_kg, wheelbase_m)
     behind = "" if lf_m is None else steered_behind(motion, lf_m, wheelbase_m - lf_m)
     if behind:
         warn(f"{log.name}: {behind}")
+
+
+def _check_magnitudes(log: Log, slow: Drive, mass_kg: float, wheelbase_m: float) -> None:
+    """Refuse the log of a car of quite another size, which never drives as fast as this car does.
+
+    So slowly slopes and backlash tell much of force and steering: less than a magnitude says
+    nothing.
+    """
+    mass = _mass(slow, mass_kg) if log.has("fx_n") else None
+    other = "the vehicle file is that of another car, or in other units; give the one of this car"
+    if mass is not None and mass.off(_MAGNITUDE, _FORCE_STD):
+        raise InvalidInput(
+            f"{log.name}: mass_kg = {mass_kg:g}, but fx_n moves the car as if it had "
+            f"{mass_kg / mass.ratio:.4g} kg, {mass.place}; {other}"
+        )
+    steer = _steer(slow, wheelbase_m)
+    if steer is not None and steer.off(_MAGNITUDE, _STEER_STD):
+        raise InvalidInput(
+            f"{log.name}: it turns as a car with a wheelbase of about "
+            f"{steer.ratio * wheelbase_m:.2g} m does, {steer.place}, and lf_m + lr_m are "
+            f"{wheelbase_m:g} m; {other}, or mend the unit of steer_rad"
+        )
 
 
 def _check_numbers(log: Log, drive: Drive, mass_kg: float, wheelbase_m: float) -> None:

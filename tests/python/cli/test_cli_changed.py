@@ -77,3 +77,25 @@ def test_the_later_drives_are_needed_and_read_like_the_others(
     assert "--after" in capsys.readouterr().err
     assert main([*argv, "--after", str(folder / "car.toml")]) == 2
     assert "car" in capsys.readouterr().err
+
+
+def test_a_time_limit_ends_the_command_and_says_what_it_left_out(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    then, now, car, figures = (folder / n for n in ("then.csv", "now.csv", "car.toml", "few.json"))
+    asked = ["changed", str(then), "--after", str(now), "--vehicle", str(car)]
+    assert main([*asked, "--json", str(figures), "--time-limit", "0.001"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("no change is shown by what was tried in time")
+    assert "the time limit ended the comparison: " in err
+    assert "the likeliest parameters of the reference" in err
+    told = json.loads(figures.read_text(encoding="utf-8"))
+    assert any("gyro_bias" in fact for fact in told["late_facts"])
+    assert told["effects"]["gyro_bias"]["said"] != "unchanged"
+
+
+def test_a_time_limit_is_above_zero(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["changed", "a.csv", "--after", "b.csv", "--vehicle", "c.toml", "--time-limit", "0"]
+    with pytest.raises(SystemExit):
+        main(asked)
+    assert "seconds (above 0)" in capsys.readouterr().err

@@ -5,6 +5,7 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
+import model_cars
 import numpy as np
 import pytest
 
@@ -87,6 +88,12 @@ def test_a_force_in_kn_moves_no_car_of_usual_length() -> None:
         Log.from_arrays(driven(1.5, 2.7))
 
 
+def test_of_a_model_car_with_the_file_of_another_one_its_own_file_is_asked_for() -> None:
+    """In thousands of newtons 2.3 kg would be 2300 kg: not the unit need be wrong."""
+    with pytest.raises(sv.InvalidInput, match="of a model car, give its own vehicle file"):
+        Log.from_arrays(driven(2.3), vehicle=sv.example_vehicle())
+
+
 def test_a_fast_model_car_needs_little_force() -> None:
     """Three kilograms at 16 m/s, where the drag of any other car takes more than 30 N."""
     table = driven(3.0)
@@ -121,3 +128,42 @@ def test_a_quick_model_car_needs_little_force() -> None:
     assert "fx_n" in Log.from_arrays(log, vehicle=car).channels
     with pytest.raises(sv.InvalidInput, match=r"fx_n: .* of a model car, read the log with its"):
         Log.from_arrays(log)
+
+
+@pytest.fixture(scope="module")
+def slow() -> Log:
+    """A model car of 2.3 kg in a yard, always below 5 m/s."""
+    model = sv.Model(model_cars.car())
+    return sv.drive(model, sv.manoeuvres.lap(60.0, 4.0, 4.5), seed=1, rate_hz=100.0)
+
+
+@pytest.mark.parametrize(
+    ("leave_out", "told"),
+    [((), "mass_kg = 900, but fx_n moves the car as if it had 2.2"), (("fx_n",), "wheelbase of")],
+)
+def test_a_slow_model_car_is_not_one_of_900_kg(
+    slow: Log, leave_out: tuple[str, ...], told: str
+) -> None:
+    """A full-size car at its speeds turns by its wheelbase; this one never drives so fast."""
+    log = slow.without(*leave_out) if leave_out else slow
+    with pytest.raises(sv.InvalidInput, match=re.escape(told)) as error:
+        check_car(log, mass_kg=900.0, wheelbase_m=2.4)
+    assert "the vehicle file is that of another car" in str(error.value)
+    car = model_cars.car()
+    check_car(log, mass_kg=car.mass_kg, wheelbase_m=car.wheelbase_m)
+
+
+@pytest.mark.parametrize("slope_rad", [0.0, 0.03])
+def test_a_car_that_only_manoeuvres_slowly_is_itself(slope_rad: float) -> None:
+    """On hills, too: below 5 m/s no more than magnitudes are told."""
+    car = sv.example_vehicle()
+    for seed in range(4):
+        log = sv.drive(
+            sv.Model(car),
+            sv.manoeuvres.lap(60.0, 1.5, 4.0),
+            seed=seed,
+            rate_hz=50.0,
+            disturbance=sv.RoadDisturbance(slope_rad=slope_rad),
+        )
+        for few in (log, log.without("fx_n")):
+            check_car(few, mass_kg=car.mass_kg, wheelbase_m=car.wheelbase_m)

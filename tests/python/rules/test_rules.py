@@ -25,7 +25,7 @@ PACKAGE = Path(__file__).resolve().parents[3] / "python" / "sysid_vehicle"
 # claim. Those of the last group shape how what no name fits is described; no effect is claimed.
 NUMERICAL = {
     "diagnose/change/beside_reference.py": {"_RIDGE"},
-    "diagnose/changed.py": {"_LACKS"},  # times that a reference is fitted anew
+    "diagnose/changed.py": {"_LACKS", "_ASKED"},  # rounds, and a share of time
     "diagnose/change/changes_compete.py": {"_SINGULAR", "_MOST"},
     "diagnose/change/both_axles.py": {"_USUAL"},  # prior sizes of changes
     "diagnose/change/may_change.py": {"_INERTIA", "_LARGEST_SLIP_RAD", "_PARTS"},

@@ -45,6 +45,8 @@ class Change(Printed):
     lacks : tuple of str
         Effects that the reference lacked, and that were put into its model: it shows them alone,
         or in both drivings the same they explain more than what seemed to have changed.
+    late_facts : tuple of str
+        What a time limit left out.
     """
 
     before: Fit
@@ -55,6 +57,7 @@ class Change(Printed):
     alike: Alike
     rules: Rules
     lacks: tuple[str, ...] = ()
+    late_facts: tuple[str, ...] = ()
 
     __iter__ = None  # numbers are no names
 
@@ -76,8 +79,8 @@ class Change(Printed):
 
     @property
     def calm(self) -> bool:
-        """Whether no change is shown, and none is likely."""
-        told = bool(self.named or self.unknown)
+        """Whether no change is shown, none is likely, and no time limit left anything out."""
+        told = bool(self.named or self.unknown or self.late_facts)
         return not told and not any(e.said in ("likely", "implausible") for e in self.effects)
 
     @property
@@ -130,7 +133,8 @@ class Change(Printed):
                 "something changed, and no effect is sure enough to be named: that nothing did has "
                 f"a probability of {number(self.nothing, 2)}"
             )
-        return "no change is shown"
+        tried = " by what was tried in time" if self.late_facts else ""
+        return f"no change is shown{tried}"
 
     _HEAD = ("what", "by how much", "how sure", "")
 
@@ -153,6 +157,8 @@ class Change(Printed):
                 f"the reference lacks {', '.join(self.lacks)}, in both drivings the same: compared "
                 "with it in the model",
             )
+        if self.late_facts:
+            told.insert(0, f"the time limit ended the comparison: {'; '.join(self.late_facts)}")
         if self.load is not None:
             told.insert(0, f"mass and centre of gravity: as {self.load} would change them")
         return [self._headline(), *told, self._power(), Table(self._HEAD, self._rows())]
@@ -197,5 +203,6 @@ class Change(Printed):
             "causes": self.causes.to_dict(),
             "nothing": self.nothing,
             "lacks": list(self.lacks),
+            "late_facts": list(self.late_facts),
             "effects": {e.id: e.to_dict() for e in self.effects},
         }

@@ -17,6 +17,7 @@ Said = Literal[
     "likely",
     "unchanged",
     "not testable",
+    "not tried",
 ]
 
 _NAMED: tuple[Said, ...] = ("changed", "one of a group")
@@ -58,8 +59,8 @@ class EffectChange:
     said : str
         `changed`; `one of a group` that explain the driving as well; `implausible`: it acts like
         what changed, with a size that no car has; `negligible`; `likely`, as something changed and
-        no effect is shown by itself; `unchanged`, with a bound below what matters; or `not
-        testable` with this driving.
+        no effect is shown by itself; `unchanged`, with a bound below what matters; `not testable`
+        with this driving; or `not tried`, as the time limit left it out.
     group : tuple of str
         The others of the group.
     stiffness : tuple of float, optional
@@ -128,8 +129,9 @@ class EffectChange:
             return f"changed; confounded with {', '.join(self.group)}"
         if self.said == "implausible":
             return "significant, but the change is physically implausible"
-        if self.said in ("likely", "unchanged", "not testable"):
-            what = "likely, but not shown" if self.said == "likely" else self.said
+        if self.said in ("likely", "unchanged", "not testable", "not tried"):
+            words = {"likely": "likely, but not shown", "not tried": "not tried in time"}
+            what = words.get(self.said, self.said)
             if self.stiffness is not None:
                 return f"{what}; {self.power}"
             bounds = zip(self.names, self.bound, self.units, strict=True)

@@ -35,6 +35,21 @@ class Lines:
     known: Shared
 
     @classmethod
+    def of(cls, reference: Reference, state: Exact, *, another: bool, at_one_point: bool) -> Lines:
+        """At one point where something was put in, or where it is asked for.
+
+        Of another vehicle file what both share is told in the terms of the later one.
+        """
+        side = reference.side
+        lines = cls(side, state.shift, reference.shared)
+        if another:
+            same = replace(reference.before, model=without(state.searched))
+            names, effects = reference.names, reference.effects
+            side = Side(same, names, effects, like=side, residuals_of=side)
+            return replace(lines, side=side)
+        return cls.at_one_point(reference, state) if state.put or at_one_point else lines
+
+    @classmethod
     def at_one_point(cls, reference: Reference, state: Exact) -> Lines:
         """The reference where a state has what did not change, and what did as it was before."""
         known, model = reference.shared, without(state.searched)

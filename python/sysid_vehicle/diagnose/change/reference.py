@@ -92,6 +92,7 @@ class Reference:
         Their columns, and those of clocks.
     shared : Shared
         Effects that the model lacks are about as large as usual, or nothing.
+    rules : Rules
     nothing : Exact
         Both drivings without a change, at the highest maximum that any search came to.
     """
@@ -105,7 +106,7 @@ class Reference:
         effects: Sequence[Effect],
         rules: Rules = USUAL,
     ) -> None:
-        self.before, self.effects, self._rules = before, tuple(effects), rules
+        self.before, self.effects, self.rules = before, tuple(effects), rules
         model = before.model
         names = dict.fromkeys([*(n for m in may for n in m.names), *model.free_names])
         self.names = tuple(names)
@@ -191,6 +192,14 @@ class Reference:
         model, value = self._fit(start, put, sizes, usual, own, also)
         return self._exact(start, put, sizes, model, value, climbed=False)
 
+    def as_it_is(self, start: Fit) -> Exact:
+        """Nothing changed, and nothing was fitted to the later driving: where no time is left."""
+        model = start.model
+        objective = together(self.before, start, model, self.before.model, ())
+        value = objective.log_likelihood(model.vector(), self.before.noise.vector())
+        self._fitted[frozenset()] = self.before.model, self._alone
+        return self._without(start, model, value)
+
     def _without(self, start: Fit, model: Model, value: float) -> Exact:
         """Nothing changed."""
         self._nothing, self._unchanged = value, model
@@ -241,7 +250,7 @@ class Reference:
         self._likeliest = max(self._likeliest, value)
         # What gains too little to be named, or to replace the best: what it shares is not asked.
         leads = max(self._best - self._nothing, 0.0)
-        if put and value - self._nothing > max(self._rules.told, self._rules.near * leads):
+        if put and value - self._nothing > max(self.rules.told, self.rules.near * leads):
             seconds = [d.usable_s for d in (self.before.driving, start.driving)]
             wanted = self._fitted[frozenset(put)][1] - self._alone
             wanted *= sum(seconds) / seconds[0]  # as much in each second of both
@@ -291,7 +300,7 @@ class Reference:
         ends.append(ends[0] | {n: self._unchanged.value(n) for n in self._unchanged.free_names})
         both, value = self._followed(objective, apart, ends, climb=climb)
         loss = 0.5 * self._squared({n: both.value(n) - own.value(n) for n in changed})
-        allowed = value if loss <= self._rules.told else min(value, self._nothing + wanted)
+        allowed = value if loss <= self.rules.told else min(value, self._nothing + wanted)
         return value, allowed, both
 
     def _followed(

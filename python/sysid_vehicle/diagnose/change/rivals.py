@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 
 from ...rules import Rules
 from ..candidates.causes import CredibleSet
-from .both_axles import by_other_names
+from .both_axles import by_other_names, hold_tyres
 from .changes_compete import Competition
-from .may_change import May
+from .may_change import May, as_one
+from .reference import Exact
 
 
 def leading(told: Competition, put: Sequence[str], can: Mapping[str, May]) -> tuple[str, ...]:
@@ -56,3 +57,33 @@ def beside(told: Competition, can: Mapping[str, May], rules: Rules) -> tuple[str
     """
     log_odds = {e: x for e, x in told.beside_put.items() if e in can}
     return CredibleSet.of(log_odds, rules.credible).effects if log_odds else ()
+
+
+def idle(effect: str, state: Exact, visited: Mapping[frozenset[str], Exact], least: float) -> bool:
+    """Whether a part of what was put in does as well without an effect, but for `least` nats.
+
+    As a payload does that shifts no centre of gravity. A rival in the place of such an effect is a
+    rival beside that part, to which lines lead from there.
+    """
+    put = frozenset(state.put)
+    parts = (s for key, s in visited.items() if key and key < put and effect not in key)
+    return any(s.log_likelihood > state.log_likelihood - least for s in parts)
+
+
+def lacking(
+    effect: str,
+    several: Sequence[str],
+    group: Sequence[str],
+    visited: Mapping[frozenset[str], Exact],
+) -> list[Exact]:
+    """What was fitted without an effect of several and without its group (`Search.lacking`)."""
+    put, rest = frozenset(several), frozenset(several) - {effect}
+    without = put - {e for one in as_one(several) if effect in one for e in one}
+    return [
+        s
+        for key, s in visited.items()
+        if (s.climbed or key == without)
+        and key.isdisjoint((effect, *group))
+        and not hold_tyres(key, effect)
+        and not (rest < key and len(key) == len(put))
+    ]

@@ -59,7 +59,9 @@ class Saying:
         causes = priced.causes.only([*shown, *self._not_refused(priced, few)], {})
         sizes, stds = self._told_sizes(shown, few)
         nothing = search.nothing(told)
-        calm = nothing > 1.0 - search.rules.credible
+        late = search.in_time.effects(state.put)
+        scored = any(e in late for s in told.causes.sets for e in s.effects)
+        calm = nothing > 1.0 - search.rules.credible and not scored
         found = [self._of(m, causes, sizes, stds, told, calm=calm) for m in self.search.may]
         order = [e for s in causes.sets for e in s.effects]
         sure = causes.inclusion
@@ -67,7 +69,14 @@ class Saying:
             key=lambda e: (order.index(e.id) if e.id in order else len(order), -sure.get(e.id, 0.0))
         )
         return Change(
-            search.before, state.fit, causes, tuple(found), nothing, search.alike, search.rules
+            search.before,
+            state.fit,
+            causes,
+            tuple(found),
+            nothing,
+            search.alike,
+            search.rules,
+            late_facts=search.in_time.facts(state.put),
         )
 
     def _not_refused(self, told: Competition, state: Exact) -> list[CredibleSet]:
@@ -77,6 +86,7 @@ class Saying:
         than white ones, several that vary less may take the place of that.
         """
         put, tried = state.put, self.search.visited.keys() | self.search.failed
+        late = self.search.in_time.effects(put)
         least = scipy.special.logit(self.search.rules.credible)
         return [
             s
@@ -84,6 +94,7 @@ class Saying:
             if not any(e in put for e in s.effects)
             and not told.acts_like(s.effects[0])
             and frozenset({*put, s.effects[0]}) not in tried
+            and s.effects[0] not in late
             and told.beside_put.get(s.effects[0], np.inf) > least
         ]
 
@@ -209,6 +220,11 @@ class Saying:
         least = np.log(self.search.rules.credible)
         if whole - scipy.special.logsumexp([whole, *absent]) < least:
             return None
+        # What was not tried in its place in time speaks against the name.
+        late = self.search.in_time.in_place_of(effect, state.put)
+        more = {e: log_odds[effect] for e in late if e not in found.effects}
+        if more:
+            found = CredibleSet.of({e: log_odds[e] for e in found.effects} | more, 1.0)
         return found.led_by(effect)  # sizes of what leads are told together
 
     def _some_off_nothing(
@@ -290,13 +306,17 @@ class Saying:
         can_be = possible(m, *raw, rules) if stiffness is None else self._can_be(m, stiffness)
         said, group = self._verdict(m, causes, can_be=can_be, small=small)
         if said == "not testable":
-            if all(b < w for b, w in zip(bound, matters, strict=True)):
+            if m.id in self.search.in_time.effects(self.state.put):
+                likely = not calm and self._likely(m.id, causes.inclusion.get(m.id, 0.0))
+                said = "likely" if likely else "not tried"
+            elif all(b < w for b, w in zip(bound, matters, strict=True)):
                 said = "unchanged"
             elif not calm and self._likely(m.id, causes.inclusion.get(m.id, 0.0)):
                 said = "likely"
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
         # Of what driving does not tell, its line has a probability that says nothing.
-        sure = None if said in ("unchanged", "not testable") else causes.inclusion.get(m.id, 0.0)
+        silent = said in ("unchanged", "not testable", "not tried")
+        sure = None if silent else causes.inclusion.get(m.id, 0.0)
         least_stiffness = None if stiffness is None else self._least_stiffness(m, stiffness[1])
         figures = (value, std, bound, sure, said, group, least, stiffness, least_stiffness)
         hidden = told.hidden(m.id, m.usually) if m.usually else (False, ())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy
@@ -17,9 +17,9 @@ from ...rules import Rules
 from ...vehicle import AXLES, GRAVITY_MPS2
 from ..candidates.clocks import CLOCKS
 from ..candidates.possible import considered
-from .beside_reference import Differences, Side
-from .both_axles import SCALINGS, by_other_names, factors, hold_tyres, moves, seated, without
+from .both_axles import SCALINGS, by_other_names, seated
 from .changes_compete import Competition
+from .in_time import InTime
 from .may_change import (
     PAYLOAD,
     YAW_INERTIA,
@@ -30,10 +30,10 @@ from .may_change import (
     of_inertia,
     of_tyre,
 )
-from .one_point import Lines
 from .pieces import Pieces
 from .reference import Exact, Reference
-from .rivals import beside, in_place, instead, leading
+from .rivals import beside, idle, in_place, instead, lacking, leading
+from .telling import Telling
 
 _TRIED = 5  # of the best single changes, exactly
 _BESIDE = 2  # of what goes best with each of these
@@ -53,6 +53,8 @@ class Search:
     candidates : sequence of str, optional
         Effects beside those of the model that may have changed.
     rules : Rules
+    in_time : InTime, optional
+        When searches end; what was not fitted by then is noted.
 
     Attributes
     ----------
@@ -71,12 +73,20 @@ class Search:
         How like the reference the later driving is.
     """
 
+    in_time = InTime()
+
     def __init__(
-        self, before: Fit, start: Fit, candidates: Sequence[str | Effect] | None, rules: Rules
+        self,
+        before: Fit,
+        start: Fit,
+        candidates: Sequence[str | Effect] | None,
+        rules: Rules,
+        in_time: InTime | None = None,
     ) -> None:
         self.before, self.start, self.rules = before, start, rules
+        self.in_time = in_time or InTime()
         known = Pieces(before.driving)
-        self._pieces, self.alike = (known, Pieces(start.driving, known)), known.alike(start.driving)
+        pieces, self.alike = (known, Pieces(start.driving, known)), known.alike(start.driving)
         model, both = start.model, (before.driving, start.driving)
         free, lacked = set(model.free_names), {e.id for e in before.model.candidates}
         effects = tuple(
@@ -96,13 +106,17 @@ class Search:
         fitted += map(of_effect, self._scalings)
         self.can = {m.id: m for m in fitted}
         self.may = [*fitted, *map(of_clock, clocks)]
+        self._telling = Telling(
+            self.reference, start, self.may, self._scalings, pieces, self.alike.unlike
+        )
         self.visited: dict[frozenset[str], Exact] = {}
         self.failed: set[frozenset[str]] = set()
 
     @cached_property
     def singles(self) -> Competition:
         """What competes beside nothing, where what may have changed alone has been fitted."""
-        begin = self.visited[frozenset()] = self.reference.fitted(self.start, (), {}, {})
+        nothing = self.in_time.of(lambda: self.reference.fitted(self.start, (), {}, {}), None)
+        begin = self.visited[frozenset()] = nothing or self.reference.as_it_is(self.start)
         # Lines are drawn from the reference: where nothing may change it goes far from any car.
         told = self.told(replace(begin, fit=self.start, shift=np.zeros_like(begin.shift)))
         alone = [(e,) for e in told.alone if e in self.can][:_TRIED]
@@ -131,18 +145,24 @@ class Search:
             if best.put in seen:
                 break
             state = best
+            if self.in_time.over:
+                told = self.told(state)
+                break
         return self._settled(told, state)
 
     def _visit_in_place(self, state: Exact, told: Competition) -> None:
-        """What may be there in place of each effect that was put in."""
-        for few in [
-            instead(state.put, e, r) for e in state.put for r in in_place(e, told, self.can)
-        ]:
+        """What may be there in place of each effect that was put in, and is not idle there."""
+        least = self.rules.told * told.ratio_of(state.put)
+        asked = [e for e in state.put if not idle(e, state, self.visited, least)]
+        for few in [instead(state.put, e, r) for e in asked for r in in_place(e, told, self.can)]:
             self._visit(few, told)
 
     def _in_twos(self) -> None:
         """Of each change that was fitted alone, that together with what lines name beside it."""
         for state in [s for s in self.visited.values() if s.put]:
+            if self.in_time.over:
+                self.in_time.twos = True
+                break
             told = self.told(state)
             for more in beside(told, self.can, self.rules)[:_BESIDE]:
                 start = dict.fromkeys(self.can[more].names, 0.0) | state.changes
@@ -178,7 +198,9 @@ class Search:
     def _at_maximum(self, state: Exact) -> Exact:
         """The state where its likelihood is highest, as that of nothing is."""
         with suppress(NumericalError, np.linalg.LinAlgError):
-            self.visited[frozenset(state.put)] = self.reference.climbed(self.start, state)
+            there = self.in_time.of(lambda: self.reference.climbed(self.start, state), None)
+            self.in_time.maxima |= there is None
+            self.visited[frozenset(state.put)] = there or state
             self.visited[frozenset()] = self.reference.nothing
         return self.visited[frozenset(state.put)]
 
@@ -292,32 +314,7 @@ class Search:
 
     def told(self, state: Exact, *, at_one_point: bool = False) -> Competition:
         """What competes beside what was put in: lines are then drawn at one point of both."""
-        reference, side = self.reference, self.reference.side
-        multiplied = factors(state.searched)
-        names, effects = reference.names, reference.effects
-        later = Side(state.fit, names, effects, like=side, factors=multiplied)
-        lines = Lines(side, state.shift, reference.shared)
-        if self.start.model.vehicle != self.before.model.vehicle:
-            # What both share is told in terms of the vehicle file of the later driving.
-            same = replace(self.before, model=without(state.searched))
-            side = Side(same, names, effects, like=side, residuals_of=side)
-            lines = replace(lines, side=side)
-        elif state.put or at_one_point:
-            lines = Lines.at_one_point(reference, state)
-        differences = Differences(
-            lines.side, later, lines.shift, lines.known, self._pieces, self.alike.unlike
-        )
-        return Competition(
-            differences,
-            self.may,
-            reference.place,
-            side.names,
-            np.diag(side.information),
-            self.start.driving.samples,
-            state.put,
-            self.rules,
-            {n: moves(e.id, state.searched) for e in self._scalings for n in e.named},
-        )
+        return self._telling.of(state, at_one_point=at_one_point)
 
     def _leading(self, told: Competition, state: Exact) -> tuple[str, ...]:
         return leading(told, state.put, self.can)
@@ -331,9 +328,14 @@ class Search:
         self.failed.add(key)
         with suppress(NumericalError, np.linalg.LinAlgError):
             lines = {n: told.sizes[n] for n in usual}
-            exact = self.reference.fitted(self.start, put, lines, usual, also)
-            self.visited |= {key: exact, frozenset(): self.reference.nothing}
+            exact = self.in_time.of(
+                lambda: self.reference.fitted(self.start, put, lines, usual, also), None
+            )
             self.failed.remove(key)
+            if exact is None:
+                self.in_time.late[key] = put
+            else:
+                self.visited |= {key: exact, frozenset(): self.reference.nothing}
 
     def lacking(self, effect: str, state: Exact, group: Sequence[str]) -> list[Exact]:
         """What was fitted, to its maximum, without an effect and all of its group.
@@ -341,16 +343,7 @@ class Search:
         Nothing at all is among it, and what was put in without this change; what has another effect
         in its place is not, as `odds` knows that, nor what holds it by other names.
         """
-        put, rest = frozenset(state.put), frozenset(state.put) - {effect}
-        without = put - {e for several in as_one(state.put) if effect in several for e in several}
-        return [
-            s
-            for key, s in self.visited.items()
-            if (s.climbed or key == without)
-            and key.isdisjoint((effect, *group))
-            and not hold_tyres(key, effect)
-            and not (rest < key and len(key) == len(put))
-        ]
+        return lacking(effect, state.put, group, self.visited)
 
     def evidence(self, state: Exact, told: Competition, ratio: float) -> float:
         """Log-likelihood over the variance ratio, less the price of the changes [nats].
@@ -368,11 +361,15 @@ class Search:
         put = frozenset(state.put)
         return any(
             state.among <= part.among
-            or state.log_likelihood - self.reference.sharing(self.start, state, put - key)
-            < self.rules.told * ratio
+            or state.log_likelihood - self._sharing(state, put - key) < self.rules.told * ratio
             for key, part in self.visited.items()
             if key < put and part.reached > state.reached
         )
+
+    def _sharing(self, state: Exact, few: frozenset[str]) -> float:
+        """Log-likelihood with some changes in both drivings; as good where nobody asked in time."""
+        work = partial(self.reference.sharing, self.start, state, few)
+        return self.in_time.of(work, state.log_likelihood)
 
     def over_nothing(self, state: Exact, told: Competition, ratio: float) -> float:
         """By how much a state is likelier than that nothing changed [nats]."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
-from ..._common.files import read_text
+from ..._common.files import read_json
+from ..._common.kinds import TYRES
 from ..._common.printed import Part, Printed, Table
 from ..._common.progress import doing
 from ..._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
@@ -65,8 +65,8 @@ class IdentifiedCar:
         InvalidInput
             The file is not such a one.
         """
+        told = read_json(path, TYRES)
         try:
-            told = json.loads(read_text(path))
             return cls(
                 GreyBoxVehicle(**told["vehicle"]),
                 as_float64(

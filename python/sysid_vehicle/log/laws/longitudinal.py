@@ -147,7 +147,8 @@ def check_force(drive: Drive, *, model_car: bool) -> list[Contradiction]:
     if model_car:
         text = f"{told}; if this is no model car, and {what}"
         return [Contradiction("fx_n", text, by_the_car=True)]
-    raise Implausible("fx_n", f"{told}; if {what}")
+    small = "of a model car, give its own vehicle file"
+    raise Implausible("fx_n", f"{told}; if {what}; {small}")
 
 
 def held_speed_note(drive: Drive) -> list[Contradiction]:

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from ..._common.files import read_bytes
+from ..._common.kinds import own_kind
 from ...errors import InvalidInput
 
 _ARRAYS = "and give a dict of its one-dimensional arrays to read_log in place of the path"
@@ -54,6 +55,8 @@ def read_text_table(path: str | Path) -> str:
         If the file cannot be read, or is none of text; the message says what it is.
     """
     raw = read_bytes(path)
+    if kind := own_kind(raw):
+        raise InvalidInput(f"{path}: is {kind}, no log; give the log of a drive")
     for signature, what, remedy in _SIGNATURES:
         if raw.startswith(signature):
             raise InvalidInput(f"{path}: is {what}, not CSV; {remedy}")

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray
 from ..._common.files import read_toml, refuse_unknown
+from ..._common.kinds import MAP
 from ..._common.typed import typed_fields
 from ...errors import InvalidInput
 from ...log import CHANNELS, listed
@@ -82,7 +83,7 @@ class ChannelMap:
         InvalidInput
             If the file cannot be read or holds an unknown key or a value of the wrong kind.
         """
-        content = read_toml(path)
+        content = read_toml(path, MAP)
         refuse_unknown(content, _TABLES, str(path))
         if not any(isinstance(content.get(name), dict) for name in _TABLES):
             raise InvalidInput(f"{path}: the table [channels] is missing; add it")
