@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, InvalidInput, Log, Model, compare
+from sysid_vehicle import Fit, InvalidInput, Log, Model, RoadDisturbance, compare, drive
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving, turning, turning_blocks
 from sysid_vehicle.identify.ahead.ahead import of_few
+from sysid_vehicle.manoeuvres import usual_road
 from sysid_vehicle.rules import Share, worse
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.ahead.beyond import Beyond, beyond_noise, own_share
@@ -88,6 +89,34 @@ def test_a_model_that_loses_the_car_is_worse(fit: Fit, course: Log) -> None:
     assert len(grown) == len(PREDICTED)
     assert worse(changes(broken, fit, driving, (1.0,))) == ()
     assert changes(broken, broken, driving, (1.0,)) == ()
+
+
+@pytest.mark.parametrize("slope_rad", [0.0, 0.015])
+def test_the_speed_of_a_driver_who_answers_slopes_is_not_held_against_a_model(
+    fit: Fit, slope_rad: float
+) -> None:
+    """With slopes ahead unknown, what the force does too little is what the speed errs less by."""
+    gains = {"force_gain.drive_error": 0.16, "force_gain.brake_error": 0.16}
+    truth = Model(fit.model.vehicle).add("force_gain").with_values(gains)
+    road = RoadDisturbance(slope_rad=slope_rad)
+    log = drive(truth, usual_road("country", 80.0, 3), seed=3, disturbance=road, rate_hz=50.0)
+    slope = (9.81 * slope_rad,) * 2
+    noise = replace(fit.noise, disturbance=(10.0,) * 3, road=slope, road_time_s=5.0)
+    right = replace(fit, model=truth, noise=noise)
+    without = replace(right, model=Model(fit.model.vehicle))
+    driving = Driving.of(log)
+    before, after = (
+        np.nanmedian(block_errors(f, noise.floor(), driving, (1.0, 2.0)), axis=0)
+        for f in (without, right)
+    )
+    speed = PREDICTED.index("vx_mps")
+    assert np.all((after > before)[:, speed]) == (slope_rad > 0.0)
+    assert np.all((after < before)[:, PREDICTED.index("ax_mps2")])
+    found = changes(without, right, driving, (1.0, 2.0))
+    asked = {c.channel for c in found}
+    assert ("vx_mps" in asked) == (slope_rad == 0.0)
+    assert asked >= {"ax_mps2", "vy_mps", "yaw_rate_radps"}
+    assert worse(found) == ()
 
 
 def test_a_spin_does_not_decide(
