@@ -23,6 +23,7 @@ from sysid_vehicle.study.ahead.horizons import (
     horizons,
     moved_by,
     moving_with,
+    telling_of,
 )
 from sysid_vehicle.study.ahead.waterfall import look_ahead
 from sysid_vehicle.study.judge.matters import sizes_that_matter, sufficient, within
@@ -117,6 +118,12 @@ def test_the_speed_of_a_driver_who_answers_slopes_is_not_held_against_a_model(
     assert ("vx_mps" in asked) == (slope_rad == 0.0)
     assert asked >= {"ax_mps2", "vy_mps", "yaw_rate_radps"}
     assert worse(found) == ()
+    own = own_share(without, right, driving, (1.0, 2.0), channels=telling_of(truth.parts[0], right))
+    assert own.low > 0.05
+    grade = right.model.add("road_grade")  # moves the speed alone
+    told = [telling_of(part, replace(right, model=grade)) for part in grade.parts]
+    assert told[0] == {"ax_mps2"} | ({"vx_mps"} if slope_rad == 0.0 else set())
+    assert told[1] == {"ax_mps2", "vx_mps"}
 
 
 def test_a_spin_does_not_decide(

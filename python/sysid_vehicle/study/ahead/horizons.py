@@ -141,6 +141,17 @@ def moved_by(effect: Effect) -> frozenset[str]:
     return effect.moved if effect.felt_alone else moving_with(effect.moved)
 
 
+def telling_of(effect: Effect, fit: Fit) -> frozenset[str]:
+    """Predicted channels whose errors tell what an effect of a model takes away (`moved_by`).
+
+    Where the slope of the road varies, the acceleration along the car and not the speed, as in
+    `changes`, unless the effect moves that alone.
+    """
+    felt = "ax_mps2" in effect.moved and "ax_mps2" in fit.driving.present
+    unasked = {"vx_mps"} if felt and fit.noise.sloping else set()
+    return moved_by(effect) - unasked
+
+
 def _finite(figures: FloatArray) -> list[list[float | None]]:
     return [[float(v) if np.isfinite(v) else None for v in row] for row in figures]
 
