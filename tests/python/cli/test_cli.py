@@ -241,7 +241,7 @@ def test_a_channel_map_is_used(
     [
         (["compare", "none.csv", "--vehicle", "{car}"], "none.csv: cannot be read"),
         (["compare", "{log}", "--vehicle", "none.toml"], "none.toml: cannot be read"),
-        (["compare", "{log}", "--vehicle", "{log}"], "not a TOML file"),
+        (["compare", "{log}", "--vehicle", "{log}"], "a log in CSV, not a vehicle file"),
         (["compare", "{car}", "--vehicle", "{car}"], "car"),
         (
             ["compare", "{log}", "--vehicle", "{car}", "--effects", "drag"],

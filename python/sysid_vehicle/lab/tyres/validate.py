@@ -16,7 +16,7 @@ from ..._common.printed import Part, Printed, Table
 from ..._common.progress import doing
 from ..._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
 from ..._common.text import number
-from ..._common.typed import typed
+from ..._common.typed import typed, typed_fields
 from ...errors import InvalidInput
 from ..observer.observed import READINGS
 from .data import GreyBoxVehicle, TyreLog
@@ -44,6 +44,7 @@ class IdentifiedCar:
     parameters: FloatArray
     noise: FloatArray
 
+    @typed_fields
     def __post_init__(self) -> None:
         known = as_float64(self.parameters)
         if known.shape == (len(PARAMETERS) - 1,):  # from before there was an ellipse
