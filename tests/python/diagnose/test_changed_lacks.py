@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, Model, changed, drive, effect, identify, manoeuvres
+from sysid_vehicle import Model, changed, drive, effect, identify, manoeuvres
 from sysid_vehicle.diagnose.change.may_change import of_effect
 from sysid_vehicle.diagnose.change.pieces import Alike, Pieces
 from sysid_vehicle.diagnose.change.reference import Exact, Reference
@@ -77,9 +77,10 @@ def test_it_is_asked_for_before_the_search(
     before = identify(start, drive(truth, manoeuvres.lap(10.0), seed=3, rate_hz=50.0), starts=1)
     module, asked = sys.modules[changed.__module__], []
 
-    def shows(fit: Fit, *_: object) -> Effect | None:
-        asked.append(f"alone {fit.model.effects}")
-        return None if fit.model.effects else effect(DOWNFORCE)
+    def shows(search: Search, *_: object) -> Effect | None:
+        effects = search.before.model.effects
+        asked.append(f"alone {effects}")
+        return None if effects else effect(DOWNFORCE)
 
     class Asked(Saying):
         def __init__(self, search: Search) -> None:

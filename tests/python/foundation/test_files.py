@@ -17,6 +17,7 @@ import pytest
 from sysid_vehicle import InvalidInput
 from sysid_vehicle._common import replace as _replace
 from sysid_vehicle._common.files import check_outputs, read_text, read_toml, write_bytes, write_text
+from sysid_vehicle._common.kinds import VEHICLE
 
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="devices, links and limits")
 root = hasattr(os, "geteuid") and os.geteuid() == 0
@@ -50,7 +51,7 @@ def test_toml_that_python_cannot_hold(tmp_path: Path, text: str) -> None:
     file = tmp_path / "deep.toml"
     file.write_text(text)
     with pytest.raises(InvalidInput, match=r"deep\.toml: not a TOML file: "):
-        read_toml(file)
+        read_toml(file, VEHICLE)
 
 
 def test_new_and_old_files_are_whole_and_alone(tmp_path: Path, way: str) -> None:
