@@ -89,9 +89,8 @@ class ObserverModel {
     /// covariance would overflow within seconds. The rates are sampled exactly there in any form.
     ObserverVec predict(const ObserverVec& x, const ObserverInput& before, const ObserverInput& now,
                         ObserverMat& A, bool unread = false) const {
-        const ObserverInput u = !form_.input_before ? now
-                                : form_.inputs_held ? before
-                                                    : before.half_way(now);
+        ObserverInput u = form_.input_before ? before : now;
+        if (form_.input_before && !form_.inputs_held) u = before.half_way(now);
         const Lateral c = lateral(x[0], u);
         Mat<3, 3> J;
         J << -car_.drag_nspm * per_mass_, 0.0, 0.0, 0.0, c.y_v, c.y_r - x[0], 0.0, c.n_v, c.n_r;
