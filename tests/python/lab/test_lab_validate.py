@@ -126,7 +126,7 @@ def test_from_drive_to_validation_on_the_command_line(
 
 def test_a_file_without_tyres_is_named(tmp_path: Path) -> None:
     (tmp_path / "other.json").write_text("{}")
-    with pytest.raises(InvalidInput, match="does not hold identified tyres"):
+    with pytest.raises(InvalidInput, match="is JSON of another kind, not tyres of"):
         lab.IdentifiedCar.from_json(tmp_path / "other.json")
 
 
