@@ -197,7 +197,7 @@ def laboratory(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
         "one_before": False,
     }
     inputs = np.tile([100.0, 0.01, 5e4, 5e4], (N, 1))
-    record = {**begin, "inputs": inputs, "readings": rows(4, 15.0)}
+    record = {**begin, "inputs": inputs, "readings": rows(4, 15.0), "inputs_held": False}
     noise = {"process": q, "sensors": r}
 
     def log(**given: Any) -> Any:
@@ -234,7 +234,7 @@ def laboratory(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     yield "learn_observer_noise", (_core.learn_observer_noise, learned)
 
     grey = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6).core()
-    tyre = np.array([10.0, 1.4, 1.0, 0.0, 10.0, 1.4, 1.0, 0.0, *[0.1] * 6])
+    tyre = np.array([10.0, 1.4, 1.0, 0.0, 10.0, 1.4, 1.0, 0.0, *[0.1] * 7])
 
     def loss(motion: Any, targets: Any, weights: Any, parameters: Any, columns: Any) -> Any:
         found = _core.TyreLoss(grey, 1000.0, True, motion, targets, weights)
