@@ -1,8 +1,9 @@
 """Tyres that are driven and braked in corners, and intervals where the peak is not reached."""
 
 import dataclasses
-import math
 import warnings
+from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,67 +16,26 @@ CAR = lab.GreyBoxVehicle(
     1400.0, 2100.0, 1.2, 1.4, cg_height_m=0.5, brake_front_share=0.65, drive_front_share=0.0
 )
 TYRES = ((11.0, 1.45, 0.95, 0.1), (13.0, 1.45, 1.02, 0.1))
-SENSORS = (0.03, 0.01, 0.002, 0.03)
-STEP_S, PARTS, SAMPLES = 0.01, 4, 2500
+YAW_RATE_STD = 0.002
+WAVES = ((0.2, 0.13), (0.5, 0.3))  # Hz, of steering and wheel force
+BENCHMARK = ("closed_loop", "weaving_car")
 
 
-def driven(seed: int, *, ellipse: float, steered: float = 0.045, pulled_g: float = 0.25) -> Log:
+@pytest.fixture(scope="module")
+def driven(program: SimpleNamespace) -> Callable[..., Log]:
     """Weaving under power and brakes, by nothing of the package."""
-    rng = np.random.default_rng(seed)
-    waves = [(*p, *rng.uniform(0.0, 2.0 * math.pi, 2)) for p in ((0.2, 0.13), (0.5, 0.3))]
-    base = CAR.lf_m + CAR.lr_m
-    weight = CAR.mass_kg * 9.80665
-    x, a_x = np.array([22.0, 0.0, 0.0]), 0.0
+    of = program.weaving_car
 
-    def inputs(t: float, v_x: float) -> tuple[float, float]:
-        rise = min(t, 1.0) * (0.5 + 0.5 * t / (SAMPLES * STEP_S))
-        steer = steered * rise * sum(math.sin(2.0 * math.pi * f * t + p) for f, _, p, _ in waves)
-        pull = 0.7 * sum(math.sin(2.0 * math.pi * g * t + q) for _, g, _, q in waves)
-        return steer, weight * min(max(pulled_g * pull + 0.1 * (22.0 - v_x), -pulled_g), pulled_g)
+    def drive(seed: int, *, ellipse: float, steered: float = 0.045, pulled_g: float = 0.25) -> Log:
+        rng = np.random.default_rng(seed)
+        waves = [of.Wave(f, g, *rng.uniform(0.0, 2.0 * np.pi, 2)) for f, g in WAVES]
+        log: Log | None = of.weave(
+            of.Car(CAR, TYRES), waves, rng, ellipse=ellipse, steered=steered, pulled_g=pulled_g
+        )
+        assert log is not None
+        return log
 
-    def rates(x: np.ndarray, steer: float, along: float, a_x: float) -> np.ndarray:
-        v_x, v_y, r = x
-        moved = CAR.mass_kg * a_x * CAR.cg_height_m / base
-        front_share = CAR.brake_front_share if along < 0.0 else CAR.drive_front_share
-        slips = (
-            steer - math.atan2(v_y + CAR.lf_m * r, v_x),
-            -math.atan2(v_y - CAR.lr_m * r, v_x),
-        )
-        pulls = (along * front_share, along * (1.0 - front_share))
-        loads = (weight * CAR.lr_m / base - moved, weight * CAR.lf_m / base + moved)
-        front, rear = (
-            load
-            * d
-            * math.sin(c * math.atan(b * s - e * (b * s - math.atan(b * s))))
-            * math.sqrt(max(1.0 - ellipse * (pull / (d * load)) ** 2, 0.04))
-            for s, pull, load, (b, c, d, e) in zip(slips, pulls, loads, TYRES, strict=True)
-        )
-        ahead = pulls[0] * math.cos(steer) - front * math.sin(steer) + pulls[1]
-        across = pulls[0] * math.sin(steer) + front * math.cos(steer)
-        return np.array(
-            [
-                ahead / CAR.mass_kg + v_y * r,
-                (across + rear) / CAR.mass_kg - v_x * r,
-                (CAR.lf_m * across - CAR.lr_m * rear) / CAR.yaw_inertia_kgm2,
-            ]
-        )
-
-    rows = np.empty((SAMPLES, 7))
-    h = STEP_S / PARTS
-    for k in range(SAMPLES):
-        for part in range(PARTS):
-            steer, along = inputs(k * STEP_S + part * h, x[0])
-            slope = rates(x, steer, along, a_x)
-            a_x = slope[0] - x[1] * x[2]
-            if part == 0:
-                rows[k] = (steer, along, *x, a_x, slope[1] + x[0] * x[2])
-            steer, along = inputs(k * STEP_S + (part + 0.5) * h, x[0])
-            x = x + h * rates(x + 0.5 * h * slope, steer, along, a_x)
-    names = ("steer_rad", "fx_n", "vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
-    columns = dict(zip(names, rows.T.copy(), strict=True))
-    for name, std in zip(("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2"), SENSORS, strict=True):
-        columns[name] += std * rng.standard_normal(SAMPLES)
-    return Log.from_arrays({"time_s": STEP_S * np.arange(SAMPLES), **columns}, name="weaving")
+    return drive
 
 
 def fitted(log: Log, combined_slip: bool | None = None) -> tuple[lab.TyreFit, str]:
@@ -86,7 +46,7 @@ def fitted(log: Log, combined_slip: bool | None = None) -> tuple[lab.TyreFit, st
     return fit, " ".join(str(w.message) for w in heard if issubclass(w.category, SysidWarning))
 
 
-def test_drive_and_brake_force_make_no_smaller_peak() -> None:
+def test_drive_and_brake_force_make_no_smaller_peak(driven: Callable[..., Log]) -> None:
     log = driven(1, ellipse=1.0)
     fit, heard = fitted(log)
     assert fit[ELLIPSE].value == pytest.approx(1.0, abs=0.1)
@@ -105,7 +65,7 @@ def test_drive_and_brake_force_make_no_smaller_peak() -> None:
         assert fit[f"D_{axle}"].value == pytest.approx(tyre[2], rel=0.01)
 
 
-def test_no_ellipse_is_found_where_there_is_none() -> None:
+def test_no_ellipse_is_found_where_there_is_none(driven: Callable[..., Log]) -> None:
     fit, heard = fitted(driven(2, ellipse=0.0))
     assert ELLIPSE not in [e.name for e in fit.estimates]
     assert "ellipse" not in heard
@@ -113,7 +73,7 @@ def test_no_ellipse_is_found_where_there_is_none() -> None:
         assert fit[f"D_{axle}"].value == pytest.approx(tyre[2], rel=0.01)
 
 
-def test_an_identified_ellipse_is_validated_and_kept(tmp_path) -> None:
+def test_an_identified_ellipse_is_validated_and_kept(driven: Callable[..., Log], tmp_path) -> None:
     fit, _ = fitted(driven(3, ellipse=1.0), combined_slip=True)
     known = lab.IdentifiedCar.of(fit)
     log = lab.TyreLog.from_log(driven(4, ellipse=1.0), CAR)[0]
@@ -121,8 +81,8 @@ def test_an_identified_ellipse_is_validated_and_kept(tmp_path) -> None:
     without = known.parameters.copy()
     without[PARAMETERS.index(ELLIPSE)] = 0.0
     (other,) = lab.validate_tyres(dataclasses.replace(known, parameters=without), log)
-    assert found.rms[1, 2] < 1.2 * SENSORS[2]
-    assert other.rms[1, 2] > 2.0 * SENSORS[2]
+    assert found.rms[1, 2] < 1.2 * YAW_RATE_STD
+    assert other.rms[1, 2] > 2.0 * YAW_RATE_STD
     earlier = dataclasses.replace(known, parameters=known.parameters[:-1])
     assert np.array_equal(earlier.parameters, without)
 
