@@ -58,7 +58,8 @@ class FilteredStates {
     std::vector<std::vector<double>> runs_;
 };
 
-/// Forces are not foreseen; the slope of the road fades from where it is known.
+/// Forces are not foreseen. The slope of the road is that of the smoother, as nothing of the car
+/// foretells it; where it has to be foreseen, it fades from where it is known.
 class Predictions {
   public:
     Predictions(const Problem& problem, const double* p, const Noise& noise,
@@ -73,7 +74,11 @@ class Predictions {
           filtered_(problem, p, noise),
           model_(problem.model, p, {}, noise.disturbances()),
           rate_(problem.model.fastest_rate(p, 1.0)),
-          state_(model_.moving()) {}
+          state_(model_.moving()) {
+        if (readings || !noise.sloping()) return;
+        road_.resize(samples_ * kRoadStates);
+        if (!smoothed_road(problem, p, noise, road_.data())) road_.clear();
+    }
 
     void of_run(std::size_t number, std::size_t offset) {
         number_ = number;
@@ -102,8 +107,15 @@ class Predictions {
   private:
     /// What is known at a sample, with no forces.
     double begin(std::size_t k, std::size_t i) const {
-        const bool force = i >= model_.states() && i < model_.states() + kMotionStates;
-        return force ? 0.0 : filtered_.at(number_, k)[i];
+        const double known = filtered_.at(number_, k)[i];
+        if (i < model_.states()) return known;
+        return i < model_.states() + kMotionStates ? 0.0 : at(i - model_.states(), k, known);
+    }
+
+    /// Gravity that the smoother tells of a sample, or what else is known.
+    double at(std::size_t external, std::size_t k, double known) const {
+        const std::size_t i = external - kMotionStates;
+        return road_.empty() || i >= kRoadStates ? known : road_[(offset_ + k) * kRoadStates + i];
     }
 
     void together(const Run& run, const std::vector<std::size_t>& asked, const std::size_t* starts,
@@ -129,8 +141,10 @@ class Predictions {
                     move_lanes(model_, samples, run.dt, parts[like], state_.data(),
                                [](RecordedModel::Ready&) {});
                     for (std::size_t i = kMotionStates; i < model_.externals(); ++i)
-                        for (double& x : state_[model_.states() + i].at)
-                            x *= noise_.forget(i, run.dt);
+                        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+                            double& x = state_[model_.states() + i].at[lane];
+                            x = at(i, samples[lane].at, x * noise_.forget(i, run.dt));
+                        }
                 });
             }
             const RecordedModel::Ready& ready = read_lanes(model_, samples, state_.data());
@@ -162,7 +176,7 @@ class Predictions {
                 advance(problem_.model, x, external.data(), run.inputs[n], run.inputs[n + 1], p_,
                         run.dt, substeps_for(problem_.model, p_, x[0], run.dt));
                 for (std::size_t i = kMotionStates; i < model_.externals(); ++i)
-                    external[i] *= noise_.forget(i, run.dt);
+                    external[i] = at(i, n + 1, external[i] * noise_.forget(i, run.dt));
             }
             keep(run, h, n, sense(problem_.model, x, external.data(), run.inputs[n], p_));
         }
@@ -186,6 +200,7 @@ class Predictions {
     RecordedModel model_;
     double rate_;
     std::vector<LaneRow> state_;
+    std::vector<double> road_;
     std::size_t number_ = 0, offset_ = 0;
 };
 

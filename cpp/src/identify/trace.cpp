@@ -104,11 +104,18 @@ std::vector<std::size_t> first_samples(const Problem& problem) {
     return first;
 }
 
-/// States as they are told, samples x kStatesFull: those that a car always has, others unknown.
-void clear_states(std::size_t samples, double* out) {
-    std::fill_n(out, samples * kStatesFull, std::nan(""));
-    for (std::size_t k = 0; k < samples; ++k) std::fill_n(out + k * kStatesFull, kStatesPlain, 0.0);
-}
+/// Where smoothed means go: `width` per sample, by the names of `filter_rows`.
+struct Means {
+    double* out;
+    std::size_t width = kStatesFull;
+
+    double* at(std::size_t sample) const { return out + sample * width; }
+    /// States that a car always has are zero, others unknown.
+    void clear(std::size_t samples) const {
+        std::fill_n(out, samples * width, std::nan(""));
+        for (std::size_t k = 0; k < samples; ++k) std::fill_n(at(k), kStatesPlain, 0.0);
+    }
+};
 
 /// The backward pass over a run that the filter has gone through, from its last sample on.
 ///
@@ -117,8 +124,13 @@ void clear_states(std::size_t samples, double* out) {
 class MeansBackwards {
   public:
     MeansBackwards(const Run& run, const Noise& noise, std::size_t moving,
-                   const std::vector<int>& rows)
-        : run_(run), moving_(moving), rows_(rows), later_(rows.size(), 0.0), before_(rows.size()) {
+                   const std::vector<int>& rows, std::size_t width)
+        : run_(run),
+          moving_(moving),
+          rows_(rows),
+          width_(width),
+          later_(rows.size(), 0.0),
+          before_(rows.size()) {
         for (std::size_t d = 0; d < noise.disturbances(); ++d)
             forget_.push_back(noise.forget(d, run.dt));
     }
@@ -131,8 +143,8 @@ class MeansBackwards {
             for (std::size_t j = 0; j < n; ++j)
                 sum += s.covariance[LaneFilter::packed(std::max(i, j), std::min(i, j))] * later_[j];
             if (!std::isfinite(sum)) return false;
-            if (rows_[i] < static_cast<int>(kStatesFull))
-                out[static_cast<std::size_t>(rows_[i])] = sum;
+            const auto row = static_cast<std::size_t>(rows_[i]);
+            if (row < width_) out[row] = sum;
         }
         std::array<double, kChannels> told{};  // inverse covariance times innovation
         for (std::size_t i = 0, entry = 0; i < kChannels; entry += ++i) {
@@ -159,10 +171,11 @@ class MeansBackwards {
     const Run& run_;
     std::size_t moving_;
     const std::vector<int>& rows_;
+    std::size_t width_;
     std::vector<double> forget_, later_, before_;
 };
 
-bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise, double* out) {
+bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise, const Means& to) {
     const std::vector<Piece> pieces =
         pieces_of(problem.runs, forgets_s(problem, noise), filter_samples(problem.model));
     if (pieces.empty()) return false;
@@ -177,15 +190,14 @@ bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise
         filter.write_sample(lane, numbers.data() + (first[pieces[s.piece].run] + s.at) * wide);
     };
     if (!side_by_side(problem.runs, pieces, filter)) return false;
-    clear_states(problem.samples(), out);
+    to.clear(problem.samples());
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         const Run& run = problem.runs[i];
-        MeansBackwards means(run, noise, moving, rows);
+        MeansBackwards means(run, noise, moving, rows, to.width);
         for (std::size_t k = run.size(); k-- > 0;) {
             poll_interrupt(k);
             const double* from = numbers.data() + (first[i] + k) * wide;
-            if (!means.add(k, score_sample(from, rows.size(), moving, k),
-                           out + (first[i] + k) * kStatesFull))
+            if (!means.add(k, score_sample(from, rows.size(), moving, k), to.at(first[i] + k)))
                 return false;
         }
     }
@@ -194,25 +206,33 @@ bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise
 
 /// The same along a path that a filter has told; how single samples answer to states is worked out
 /// for many of them side by side.
-bool means_along(const Problem& problem, const double* p, const FrozenFilter& filter, double* out) {
+bool means_along(const Problem& problem, const double* p, const FrozenFilter& filter,
+                 const Means& to) {
     ToldPath path(problem, p, filter);
-    clear_states(problem.samples(), out);
+    to.clear(problem.samples());
     const std::vector<std::size_t> first = first_samples(problem);
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         const Run& run = problem.runs[i];
-        MeansBackwards means(run, filter.noise, path.moving(), filter.rows);
+        MeansBackwards means(run, filter.noise, path.moving(), filter.rows, to.width);
         for (std::size_t end = run.size(); end > 0;) {
             poll_interrupt();
             const std::size_t count = std::min(ToldPath::kTogether, end);
             end -= count;
             path.linearise(i, end, count);
             for (std::size_t j = count; j-- > 0;)
-                if (!means.add(end + j, path.sample(i, end + j),
-                               out + (first[i] + end + j) * kStatesFull))
+                if (!means.add(end + j, path.sample(i, end + j), to.at(first[i] + end + j)))
                     return false;
         }
     }
     return true;
+}
+
+/// Means without covariances; false where there are too few numbers for that, or it fails.
+bool means_alone(const Problem& logged, const double* p, const Noise& noise, const Means& to) {
+    const InTime in_time(logged, p);
+    return means_in_pieces(*in_time, p, noise, to) ||
+           (logged.samples() <= kToldSamples &&
+            means_along(*in_time, p, freeze(logged, p, noise), to));
 }
 
 }  // namespace
@@ -241,10 +261,7 @@ Trace trace(const Problem& logged, const double* p, const FrozenFilter& filter) 
 }
 
 void smoothed_means(const Problem& logged, const double* p, const Noise& noise, double* out) {
-    const InTime in_time(logged, p);
-    if (means_in_pieces(*in_time, p, noise, out)) return;
-    if (logged.samples() <= kToldSamples && means_along(*in_time, p, freeze(logged, p, noise), out))
-        return;
+    if (means_alone(logged, p, noise, {out})) return;
     const Trace told = trace(logged, p, noise, true);
     std::copy(told.state.begin(), told.state.end(), out);
 }
@@ -252,8 +269,17 @@ void smoothed_means(const Problem& logged, const double* p, const Noise& noise, 
 void smoothed_means(const Problem& logged, const double* p, const FrozenFilter& filter,
                     double* out) {
     const InTime in_time(logged, p);
-    if (!filter.tells_of(logged) || !means_along(*in_time, p, filter, out))
+    if (!filter.tells_of(logged) || !means_along(*in_time, p, filter, {out}))
         smoothed_means(logged, p, filter.noise, out);
+}
+
+bool smoothed_road(const Problem& logged, const double* p, const Noise& noise, double* out) {
+    const std::size_t width = kStatesFull + kRoadStates;
+    std::vector<double> all(logged.samples() * width);
+    if (!means_alone(logged, p, noise, {all.data(), width})) return false;
+    for (std::size_t k = 0; k < logged.samples(); ++k)
+        out = std::copy_n(all.data() + k * width + kStatesFull, kRoadStates, out);
+    return true;
 }
 
 void free_run(const Problem& logged, const double* p, double* readings) {

@@ -199,8 +199,10 @@ class PiecewiseProblem:
             # Predictions that end in a piece may have begun before it.
             before = part.where.start - max(ahead for ahead, _ in horizons) - part.piece.run
             begin = part.piece.run + max(before, 0) // apart * apart
-            errors = self.build(self.model, begin, part.piece.end).look_ahead(p, noise, horizons)
-            found.append(errors[:, part.piece.begin - begin :])
+            # Slopes of the road are those of the smoother, which knows what comes after.
+            problem = self.build(self.model, begin, part.piece.end + part.after)
+            errors = problem.look_ahead(p, noise, horizons)
+            found.append(errors[:, part.piece.begin - begin : part.piece.end - begin])
         return np.concatenate(found, axis=1)
 
 

@@ -78,7 +78,7 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
     start = stretch.where.start + at - begin
     before = start - round((_FORGETS_S + horizon_s) * log.rate_hz)
     first = max(before, stretch.where.start)
-    # Some samples more: noise is taken out of inputs by what comes before and after.
+    # Some samples more: what comes before and after takes noise out of inputs, and tells slopes.
     part = slice(first, min(start + width + round(log.rate_hz), stretch.where.stop))
     shown = slice(start - first, start - first + width)
     errors = {}

@@ -126,5 +126,45 @@ TEST(LookAhead, ErrorOfAWrongModelGrowsWithTheHorizon) {
     EXPECT_GT(yaw_rate_error(30), 1.5 * yaw_rate_error(3));
 }
 
+TEST(LookAhead, ErrorsKnowTheSlopesToComeAndReadingsDoNot) {
+    Parameters p = typical_parameters();
+    for (const std::size_t samples : {std::size_t{600}, std::size_t{6000}}) {  // in pieces, too
+        const auto slopes = mask_of({"road_bank", "road_grade"});
+        Problem problem{SingleTrack{saloon(), slopes}, {}};
+        problem.runs = {noisy_run(problem.model, p, samples, 0.01, 11)};
+        problem.model = SingleTrack{saloon(), 0};
+        Noise noise = sloping_noise();
+        noise.road_time_s = 0.5;
+        const std::size_t ahead = 150;
+        std::vector<double> knowing(problem.samples() * kChannels), foreseen(knowing.size());
+        look_ahead(problem, p.data(), noise, {{ahead, 3}}, knowing.data());
+        look_ahead(problem, p.data(), noise, {{ahead, 3}}, foreseen.data(), true);
+        for (const int c : {kVx, kVy}) {
+            const double sensor = noise.sensor[static_cast<std::size_t>(c)];
+            double with = 0.0, without = 0.0, count = 0.0;
+            for (std::size_t k = ahead; k < problem.samples(); k += 3) {
+                const std::size_t n = k * kChannels + static_cast<std::size_t>(c);
+                with += std::pow(knowing[n], 2);
+                without += std::pow(problem.runs[0].measurements[k][c] - foreseen[n], 2);
+                count += sensor * sensor;
+            }
+            EXPECT_LT(with, 1.5 * count) << c << " of " << samples;
+            EXPECT_GT(without, 3.0 * count) << c << " of " << samples;
+        }
+    }
+}
+
+TEST(LookAhead, OnALevelRoadErrorsAreThoseOfReadings) {
+    const Problem problem = one_run(0);
+    const Parameters p = typical_parameters();
+    std::vector<double> errors(problem.samples() * kChannels), foreseen(errors.size());
+    look_ahead(problem, p.data(), ordinary_noise(), {{40, 1}}, errors.data());
+    look_ahead(problem, p.data(), ordinary_noise(), {{40, 1}}, foreseen.data(), true);
+    for (std::size_t k = 40; k < problem.samples(); ++k) {
+        const std::size_t n = k * kChannels + kYawRate;
+        EXPECT_EQ(errors[n], problem.runs[0].measurements[k][kYawRate] - foreseen[n]) << k;
+    }
+}
+
 }  // namespace
 }  // namespace sysid::test

@@ -1,6 +1,7 @@
 """A long log is worked on piece by piece, with the results of the whole."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -83,6 +84,18 @@ def test_pieces_add_up_to_the_whole(
 ) -> None:
     whole, pieces = (QUESTIONS[question](*a) for a in asked)
     assert off(whole, pieces) < 1e-9
+
+
+def test_slopes_that_predictions_know_are_those_of_the_whole(
+    model: sv.Model, driving: Driving
+) -> None:
+    noise = replace(first_guess(driving, model.vehicle).floor(), road=(0.2, 0.1)).vector()
+    level = replace(first_guess(driving, model.vehicle).floor(), road=(0.0, 0.0)).vector()
+    problems = driving.problem(model), driving.problem(model, longest=LONGEST)
+    p, asked = model.vector(), [(25, 5), (50, 10)]
+    whole, pieces = (q.look_ahead(p, noise, asked) for q in problems)
+    assert off(whole, pieces) < 1e-6
+    assert off(problems[0].look_ahead(p, level, asked), whole) > 0.1
 
 
 def test_a_slow_state_has_a_longer_lead(

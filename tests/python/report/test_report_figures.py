@@ -80,8 +80,14 @@ def test_what_one_step_takes_off_is_no_single_effects(study: sv.Study) -> None:
     assert "together with steer_lag changes the error" in _effect(both, first)
 
 
-def test_the_excerpt_is_where_the_baseline_predicts_worst(study: sv.Study) -> None:
+@pytest.mark.parametrize("slope_mps2", [0.0, 0.1])
+def test_the_excerpt_is_where_the_baseline_predicts_worst(
+    study: sv.Study, slope_mps2: float
+) -> None:
     """What is predicted from a part of the driving is what all of it would give."""
+    noise = replace(study.fit.noise, road=(slope_mps2, slope_mps2), road_time_s=2.0)
+    last = replace(study.fit, noise=noise)
+    study = replace(study, fits=(*study.fits[:-1], last))
     found = worst_excerpt(study)
     assert found is not None
     whole = look_ahead(study.fits[0], study.fit.noise.floor(), study.validation, found.horizon_s)

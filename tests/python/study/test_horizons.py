@@ -9,7 +9,7 @@ import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log, Model, RoadDisturbance, compare, drive
 from sysid_vehicle.effects import effect
-from sysid_vehicle.estimate import Driving, turning, turning_blocks
+from sysid_vehicle.estimate import MEASURED, Driving, turning, turning_blocks
 from sysid_vehicle.identify.ahead.ahead import of_few
 from sysid_vehicle.manoeuvres import usual_road
 from sysid_vehicle.rules import Share, worse
@@ -23,7 +23,6 @@ from sysid_vehicle.study.ahead.horizons import (
     horizons,
     moved_by,
     moving_with,
-    telling_of,
 )
 from sysid_vehicle.study.ahead.waterfall import look_ahead
 from sysid_vehicle.study.judge.matters import sizes_that_matter, sufficient, within
@@ -93,10 +92,10 @@ def test_a_model_that_loses_the_car_is_worse(fit: Fit, course: Log) -> None:
 
 
 @pytest.mark.parametrize("slope_rad", [0.0, 0.015])
-def test_the_speed_of_a_driver_who_answers_slopes_is_not_held_against_a_model(
+def test_a_driver_who_answers_slopes_makes_the_true_car_err_no_more(
     fit: Fit, slope_rad: float
 ) -> None:
-    """With slopes ahead unknown, what the force does too little is what the speed errs less by."""
+    """The answer to slopes that predictions did not know would move another model's speed less."""
     gains = {"force_gain.drive_error": 0.16, "force_gain.brake_error": 0.16}
     truth = Model(fit.model.vehicle).add("force_gain").with_values(gains)
     road = RoadDisturbance(slope_rad=slope_rad)
@@ -107,23 +106,18 @@ def test_the_speed_of_a_driver_who_answers_slopes_is_not_held_against_a_model(
     without = replace(right, model=Model(fit.model.vehicle))
     driving = Driving.of(log)
     before, after = (
-        np.nanmedian(block_errors(f, noise.floor(), driving, (1.0, 2.0)), axis=0)
+        np.nanmedian(block_errors(f, noise.floor(), driving, (1.0, 2.0, 5.0)), axis=0)
         for f in (without, right)
     )
-    speed = PREDICTED.index("vx_mps")
-    assert np.all((after > before)[:, speed]) == (slope_rad > 0.0)
+    assert np.all((after < 1.01 * before)[:, [PREDICTED.index("vx_mps")]])
     assert np.all((after < before)[:, PREDICTED.index("ax_mps2")])
-    found = changes(without, right, driving, (1.0, 2.0))
-    asked = {c.channel for c in found}
-    assert ("vx_mps" in asked) == (slope_rad == 0.0)
-    assert asked >= {"ax_mps2", "vy_mps", "yaw_rate_radps"}
+    sensor = np.array([noise.reading[MEASURED.index(c)] for c in PREDICTED])
+    assert np.all(after < 1.5 * sensor)
+    found = changes(without, right, driving, (1.0, 2.0, 5.0))
+    assert {c.channel for c in found} == {*PREDICTED}
     assert worse(found) == ()
-    own = own_share(without, right, driving, (1.0, 2.0), channels=telling_of(truth.parts[0], right))
-    assert own.low > 0.05
-    grade = right.model.add("road_grade")  # moves the speed alone
-    told = [telling_of(part, replace(right, model=grade)) for part in grade.parts]
-    assert told[0] == {"ax_mps2"} | ({"vx_mps"} if slope_rad == 0.0 else set())
-    assert told[1] == {"ax_mps2", "vx_mps"}
+    own = own_share(without, right, driving, (1.0, 2.0), channels=moved_by(truth.parts[0]))
+    assert own.low > 0.0
 
 
 def test_a_spin_does_not_decide(

@@ -151,15 +151,22 @@ void smoothed_means(const Problem& logged, const double* p, const Noise& noise, 
 void smoothed_means(const Problem& logged, const double* p, const FrozenFilter& filter,
                     double* out);
 
+/// Gravity along and across as the smoother tells it, samples x kRoadStates, of a road of varying
+/// slope; false where the smoother fails.
+bool smoothed_road(const Problem& logged, const double* p, const Noise& noise, double* out);
+
 /// Predictions so many samples ahead, of which one sample in `every` starts one.
 struct Horizon {
     std::size_t ahead = 1;
     std::size_t every = 1;
 };
 
-/// Prediction errors from the filtered state and slope of the road, for each horizon samples x
-/// kChannels; NaN where no prediction ends. The filter runs once, and predictions that start at one
-/// sample are one prediction, read at each horizon. `readings`: what is predicted itself.
+/// Prediction errors from the filtered state, for each horizon samples x kChannels; NaN where no
+/// prediction ends. The filter runs once, and predictions that start at one sample are one
+/// prediction, read at each horizon. Where the slope of the road varies it is that of the smoother:
+/// whoever drives answers the slopes to come, and of a prediction that does not know them a car
+/// that answers less errs less. `readings`: what is predicted itself, from what was known before;
+/// the slope of the road fades.
 void look_ahead(const Problem& logged, const double* p, const Noise& noise,
                 const std::vector<Horizon>& horizons, double* errors, bool readings = false);
 

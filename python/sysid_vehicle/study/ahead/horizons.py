@@ -141,17 +141,6 @@ def moved_by(effect: Effect) -> frozenset[str]:
     return effect.moved if effect.felt_alone else moving_with(effect.moved)
 
 
-def telling_of(effect: Effect, fit: Fit) -> frozenset[str]:
-    """Predicted channels whose errors tell what an effect of a model takes away (`moved_by`).
-
-    Where the slope of the road varies, the acceleration along the car and not the speed, as in
-    `changes`, unless the effect moves that alone.
-    """
-    felt = "ax_mps2" in effect.moved and "ax_mps2" in fit.driving.present
-    unasked = {"vx_mps"} if felt and fit.noise.sloping else set()
-    return moved_by(effect) - unasked
-
-
 def _finite(figures: FloatArray) -> list[list[float | None]]:
     return [[float(v) if np.isfinite(v) else None for v in row] for row in figures]
 
@@ -326,10 +315,6 @@ def changes(
 ) -> tuple[ErrorChange, ...]:
     """How errors some seconds ahead change from one model to another.
 
-    The speed is not asked where the slope of the road varies. Drivers answer the slopes to come,
-    which nothing foretells, with the wheel force, and the speed stays: a model by which the force
-    does too little errs less than the true one. The acceleration tells of the force there.
-
     Parameters
     ----------
     before, after : Fit
@@ -343,12 +328,11 @@ def changes(
         By channel and horizon, of those that enough blocks show.
     """
     noise = after.noise.floor()
-    answered = ("vx_mps",) if noise.sloping else ()
     found = []
     both = [block_errors(fit, noise, driving, tuple(horizons_s)) for fit in (before, after)]
     for i, h in enumerate(horizons_s):
         one, other = (errors[:, i] for errors in both)
-        for channel in (c for c in explainable(driving) if c not in answered):
+        for channel in explainable(driving):
             j = PREDICTED.index(channel)
             known = (one[:, j] > 0.0) & (other[:, j] > 0.0)
             # Of a block that both models lose there is nothing to be learnt.

@@ -21,7 +21,7 @@ from ..validation import (
     gain_in_log_likelihood,
 )
 from .beyond import Beyond, own_share, taken_of
-from .horizons import LATERAL, moved_by, telling_of
+from .horizons import LATERAL, moved_by
 from .shares import shares
 
 
@@ -162,7 +162,7 @@ def _shares(
         found = {e: one[0] for e, one in zip(asked, told, strict=True) if one is not None}
         return {e: one for e, one in found.items() if one is not None}
 
-    parts = {part.id: telling_of(part, final) for part in final.model.parts}
+    parts = {part.id: moved_by(part) for part in final.model.parts}
     moved = {few: frozenset(c for e in few for c in parts[e]) for few in asked}
 
     def on_train(few: tuple[str, ...]) -> Share | None:
@@ -283,7 +283,7 @@ def together_by_motion(
     """
     first, last = (best_within(fit, test, fits[-1], rules) for fit in (fits[0], fits[-1]))
     counted = counted_in_shares(fits[-1], test, rules)
-    parts = {part.id: telling_of(part, fits[-1]) for part in fits[-1].model.parts}
+    parts = {part.id: moved_by(part) for part in fits[-1].model.parts}
     found: dict[frozenset[str], tuple[tuple[float, float], float]] = {}
     for channels in {parts[e] for e in added}:
         taken = taken_of(first, last, test, AHEAD, channels, counted=counted)

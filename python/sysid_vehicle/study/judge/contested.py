@@ -17,7 +17,7 @@ from ...effects import Effect
 from ...estimate import Driving
 from ...identify import Fit
 from ...rules import USUAL, Rules
-from ..ahead.horizons import errors_grow, telling_of
+from ..ahead.horizons import errors_grow, moved_by
 from ..results.widened import estimates_of
 from ..search.steps import insignificant
 from ..search.together import InPlace
@@ -69,7 +69,7 @@ def spoken_against(
                 "does not exclude zero"
             )
     for effect in asked:
-        if not found[effect] and errors_grow(first, final, test, telling_of(parts[effect], final)):
+        if not found[effect] and errors_grow(first, final, test, moved_by(parts[effect])):
             found[effect] = "as fitted, the errors 0.5 to 5 s ahead of the channels it moves grow"
     for effect, others in other_values(disagreements(final, test, rules), final, rules).items():
         if not found.get(effect, "told"):

@@ -44,6 +44,8 @@ def ahead(study: Study) -> str:
     if not told:
         return ""
     where = "where the car turns, on validation data"
+    if study.fit.noise.sloping:
+        where += ", the slope of the road known"
     return f"Median error {AHEAD_S:g} s ahead {where}: {', '.join(told)}."
 
 
