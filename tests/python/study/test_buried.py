@@ -12,7 +12,7 @@ from sysid_vehicle.identify import Fit
 from sysid_vehicle.log import Log
 from sysid_vehicle.study.ahead.horizons import AHEAD, PREDICTED, squares_ahead
 from sysid_vehicle.study.judge import matters
-from sysid_vehicle.study.judge.matters import buried
+from sysid_vehicle.study.judge.matters import buried, negligible
 from sysid_vehicle.study.study import Study
 
 LENGTH_M = 0.5
@@ -74,6 +74,21 @@ def test_the_true_car_is_within_the_noise_and_a_wrong_one_is_not(
     assert buried(fit, other.driving, fit.noise)
     wrong = fit.model.with_values({"D_front": 0.8 * fit.model.value("D_front")})
     assert not buried(Fit(**{**vars(fit), "model": wrong}), other.driving, fit.noise)
+
+
+def test_a_baseline_that_fails_as_it_was_fitted_is_not_adequate(
+    complete_fits: Sequence[Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though validation data would give it tyres that do."""
+    fit, other = complete_fits[0], complete_fits[1]
+    slippery = fit.model.with_values({"D_front": 0.7 * fit.model.value("D_front")})
+    failing = replace(fit, model=slippery)
+    monkeypatch.setattr(matters, "fitted_ahead", lambda _: None)
+    assert negligible(fit, fit, other.driving, fit.noise)
+    assert not negligible(failing, fit, other.driving, fit.noise)
+    assert not negligible(fit, failing, other.driving, fit.noise)
+    monkeypatch.setattr(matters, "fitted_ahead", lambda _: fit)
+    assert negligible(failing, fit, other.driving, fit.noise)
 
 
 def drowned(

@@ -39,7 +39,7 @@ from .answers import answers_of
 from .cautions import cautions
 from .contested import spoken_against
 from .foretold import foretold
-from .matters import buried, sufficient
+from .matters import buried, negligible, sufficient
 from .one_for_all import OneForAll, one_for_all
 from .slow import slow_forces
 from .structure import structure
@@ -303,7 +303,8 @@ class Judge:
         first = self.outer[0]
         if self.sizes is not None:
             return sufficient(first, self.test, self.sizes) is not None
-        return not slow and buried(at_its_best(first, self.test), self.test, self.fit.noise)
+        best = at_its_best(first, self.test)
+        return not slow and negligible(first, best, self.test, self.fit.noise)
 
     def _with_shares(self, facts: Facts, explained: Beyond | None) -> Facts:
         """What is known, with what each effect takes off the errors ahead, and all together."""

@@ -117,3 +117,20 @@ def buried(fit: Fit, test: Driving, noise: NoiseModel) -> bool:
     most = np.minimum(sensor, [usual[c] for c in PREDICTED])
     beyond = mean_of_known(squares[0], axis=0) - sensor**2
     return bool(np.all((beyond < most**2)[seen]))
+
+
+def negligible(fit: Fit, best: Fit, test: Driving, noise: NoiseModel) -> bool:
+    """Whether what a model lacks shows in no error on validation data.
+
+    Its errors are `buried` with the parameters that serve these data best, so that no tyre which
+    the training data left open is taken for an effect. The model that its user gets must do all the
+    same: one that loses the car there is not adequate.
+
+    Parameters
+    ----------
+    fit, best : Fit
+        As it was fitted to the training data, and with those parameters.
+    test, noise
+        As for `buried`.
+    """
+    return buried(best, test, noise) and sufficient(fit, test, sizes_that_matter({})) is not None
