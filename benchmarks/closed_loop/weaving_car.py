@@ -38,10 +38,11 @@ class Wave(NamedTuple):
     pull_phase: float
 
 
-def rates(
-    car: Car, x: np.ndarray, steer: float, along: float, a_x: float, ellipse: float
-) -> np.ndarray:
-    """Of v_x, v_y and yaw rate; `ellipse` is 1 for a friction circle and 0 for none."""
+State = tuple[float, float, float]  # v_x, v_y, yaw rate
+
+
+def rates(car: Car, x: State, steer: float, along: float, a_x: float, ellipse: float) -> State:
+    """Of the state; `ellipse` is 1 for a friction circle and 0 for none."""
     of, (v_x, v_y, r) = car.known, x
     base, weight = of.lf_m + of.lr_m, of.mass_kg * G
     moved = of.mass_kg * a_x * of.cg_height_m / base
@@ -58,13 +59,15 @@ def rates(
     )
     ahead = pulls[0] * math.cos(steer) - front * math.sin(steer) + pulls[1]
     across = pulls[0] * math.sin(steer) + front * math.cos(steer)
-    return np.array(
-        [
-            ahead / of.mass_kg + v_y * r,
-            (across + rear) / of.mass_kg - v_x * r,
-            (of.lf_m * across - of.lr_m * rear) / of.yaw_inertia_kgm2,
-        ]
+    return (
+        ahead / of.mass_kg + v_y * r,
+        (across + rear) / of.mass_kg - v_x * r,
+        (of.lf_m * across - of.lr_m * rear) / of.yaw_inertia_kgm2,
     )
+
+
+def moved(x: State, slope: State, h: float) -> State:
+    return x[0] + h * slope[0], x[1] + h * slope[1], x[2] + h * slope[2]
 
 
 def weave(
@@ -81,7 +84,9 @@ def weave(
     Each sine of the steering has the amplitude `steered` [rad] at the end, half of that near the
     beginning; the wheel force stays within `pulled_g` of the weight.
     """
-    weight, x, a_x = car.known.mass_kg * G, np.array([BEGINS_MPS, 0.0, 0.0]), 0.0
+    # Plain numbers: arrays of three take longer.
+    waves = [Wave(*map(float, wave)) for wave in waves]
+    weight, x, a_x = car.known.mass_kg * G, (BEGINS_MPS, 0.0, 0.0), 0.0
 
     def inputs(t: float, v_x: float) -> tuple[float, float]:
         rise = min(t, 1.0) * (0.5 + 0.5 * t / (SAMPLES * STEP_S))
@@ -100,7 +105,8 @@ def weave(
             if part == 0:
                 rows[k] = (steer, along, *x, a_x, slope[1] + x[0] * x[2])
             steer, along = inputs(k * STEP_S + (part + 0.5) * h, x[0])
-            x = x + h * rates(car, x + 0.5 * h * slope, steer, along, a_x, ellipse)
+            middle = moved(x, slope, 0.5 * h)
+            x = moved(x, rates(car, middle, steer, along, a_x, ellipse), h)
         if x[0] < SLOWEST_MPS or abs(x[1]) > MOST_SIDEWAYS * x[0]:
             return None
     names = ("steer_rad", "fx_n", "vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
