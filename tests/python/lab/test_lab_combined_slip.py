@@ -17,6 +17,7 @@ CAR = lab.GreyBoxVehicle(
 TYRES = ((11.0, 1.45, 0.95, 0.1), (13.0, 1.45, 1.02, 0.1))
 SENSORS = (0.03, 0.01, 0.002, 0.03)
 STEP_S, PARTS, SAMPLES = 0.01, 4, 2500
+State = tuple[float, float, float]
 
 
 def driven(seed: int, *, ellipse: float, steered: float = 0.045, pulled_g: float = 0.25) -> Log:
@@ -25,7 +26,8 @@ def driven(seed: int, *, ellipse: float, steered: float = 0.045, pulled_g: float
     waves = [(*p, *rng.uniform(0.0, 2.0 * math.pi, 2)) for p in ((0.2, 0.13), (0.5, 0.3))]
     base = CAR.lf_m + CAR.lr_m
     weight = CAR.mass_kg * 9.80665
-    x, a_x = np.array([22.0, 0.0, 0.0]), 0.0
+    waves = [tuple(float(p) for p in wave) for wave in waves]
+    x, a_x = (22.0, 0.0, 0.0), 0.0
 
     def inputs(t: float, v_x: float) -> tuple[float, float]:
         rise = min(t, 1.0) * (0.5 + 0.5 * t / (SAMPLES * STEP_S))
@@ -33,7 +35,7 @@ def driven(seed: int, *, ellipse: float, steered: float = 0.045, pulled_g: float
         pull = 0.7 * sum(math.sin(2.0 * math.pi * g * t + q) for _, g, _, q in waves)
         return steer, weight * min(max(pulled_g * pull + 0.1 * (22.0 - v_x), -pulled_g), pulled_g)
 
-    def rates(x: np.ndarray, steer: float, along: float, a_x: float) -> np.ndarray:
+    def rates(x: State, steer: float, along: float, a_x: float) -> State:
         v_x, v_y, r = x
         moved = CAR.mass_kg * a_x * CAR.cg_height_m / base
         front_share = CAR.brake_front_share if along < 0.0 else CAR.drive_front_share
@@ -52,13 +54,14 @@ def driven(seed: int, *, ellipse: float, steered: float = 0.045, pulled_g: float
         )
         ahead = pulls[0] * math.cos(steer) - front * math.sin(steer) + pulls[1]
         across = pulls[0] * math.sin(steer) + front * math.cos(steer)
-        return np.array(
-            [
-                ahead / CAR.mass_kg + v_y * r,
-                (across + rear) / CAR.mass_kg - v_x * r,
-                (CAR.lf_m * across - CAR.lr_m * rear) / CAR.yaw_inertia_kgm2,
-            ]
+        return (
+            ahead / CAR.mass_kg + v_y * r,
+            (across + rear) / CAR.mass_kg - v_x * r,
+            (CAR.lf_m * across - CAR.lr_m * rear) / CAR.yaw_inertia_kgm2,
         )
+
+    def stepped(x: State, slope: State, h: float) -> State:
+        return x[0] + h * slope[0], x[1] + h * slope[1], x[2] + h * slope[2]
 
     rows = np.empty((SAMPLES, 7))
     h = STEP_S / PARTS
@@ -70,7 +73,7 @@ def driven(seed: int, *, ellipse: float, steered: float = 0.045, pulled_g: float
             if part == 0:
                 rows[k] = (steer, along, *x, a_x, slope[1] + x[0] * x[2])
             steer, along = inputs(k * STEP_S + (part + 0.5) * h, x[0])
-            x = x + h * rates(x + 0.5 * h * slope, steer, along, a_x)
+            x = stepped(x, rates(stepped(x, slope, 0.5 * h), steer, along, a_x), h)
     names = ("steer_rad", "fx_n", "vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
     columns = dict(zip(names, rows.T.copy(), strict=True))
     for name, std in zip(("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2"), SENSORS, strict=True):
