@@ -20,7 +20,7 @@ def straight_on(seed: int) -> sv.Log:
 def test_nothing_is_said_of_a_drive_in_which_nothing_happens() -> None:
     """Readings of the speed hold the error of the speed, at constant speed little else."""
     with pytest.warns(sv.SysidWarning):
-        fit = sv.identify(sv.Model(sv.example_vehicle()), straight_on(530217))
+        fit = sv.identify(sv.Model(sv.example_vehicle()), straight_on(530217), starts=1)
     found = structure(fit, Driving.of(straight_on(530218)))
     assert "error of v_x 1 s ahead" in found.test
     assert found.anywhere < 0.05, found.strongest
@@ -30,7 +30,7 @@ def test_a_missing_drag_is_seen_in_the_speed_ahead() -> None:
     car = sv.Model(sv.example_vehicle())
     draggy = car.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.45})
     drives = [sv.drive(draggy, sv.manoeuvres.lap(), seed=s, rate_hz=50.0) for s in (530219, 530220)]
-    found = structure(sv.identify(car, drives[0]), Driving.of(drives[1]))
+    found = structure(sv.identify(car, drives[0], starts=1), Driving.of(drives[1]))
     assert found.test["error of v_x 1 s ahead"].low > 0.8
     assert found.test["error of v_x 5 s ahead"].low > 0.8
 
@@ -45,7 +45,7 @@ def test_a_driver_who_holds_the_speed_on_slopes_is_no_structure() -> None:
         "road", "slopes", 200.0, wander, lambda t: 2.0 * np.sin(0.5 * t), True
     )
     drives = [sv.drive(car, road, seed=s, rate_hz=50.0, disturbance=hilly) for s in (1, 2)]
-    found = structure(sv.identify(car, drives[0]), Driving.of(drives[1]))
+    found = structure(sv.identify(car, drives[0], starts=1), Driving.of(drives[1]))
     along = {name: e.low for name, e in found.test.items() if "v_x" in name or "a_x" in name}
     assert len(along) == 4
     assert max(along.values()) < 0.05, along
