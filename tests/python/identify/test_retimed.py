@@ -55,7 +55,7 @@ def test_a_fit_goes_with_the_time_of_its_readings(model: Model, log: Log, sure: 
 
 
 def test_so_does_a_fit_to_predictions(model: Model) -> None:
-    sweep = drive(model, manoeuvres.sine_sweep(), seed=4)
+    sweep = drive(model, manoeuvres.sine_sweep(), seed=4, rate_hz=50.0)
     unsure = sweep.corrected({}, (), [Retimed(MOTION, STD_S)])
     fit, without, moved = (
         predicting_ahead(identify(model, log, starts=1))

@@ -19,6 +19,21 @@ CAR = ObserverCar(mass_kg=1400.0, yaw_inertia_kgm2=2200.0, lf_m=1.2, lr_m=1.5)
 FRONT, REAR = 80e3, 100e3  # N/rad
 SENSOR_STD = np.array([0.02, 0.005, 0.001, 0.02])
 STEP_S, PARTS = 0.02, 40
+State = tuple[float, float, float]
+
+
+def rates(v_x: float, v_y: float, r: float, turn: float, push: float) -> State:
+    front = FRONT * (turn - (v_y + CAR.lf_m * r) / v_x)
+    rear = -REAR * (v_y - CAR.lr_m * r) / v_x
+    return (
+        push / CAR.mass_kg + v_y * r,
+        (front + rear) / CAR.mass_kg - v_x * r,
+        (CAR.lf_m * front - CAR.lr_m * rear) / CAR.yaw_inertia_kgm2,
+    )
+
+
+def moved(x: State, slope: State, h: float) -> State:
+    return x[0] + h * slope[0], x[1] + h * slope[1], x[2] + h * slope[2]
 
 
 def driven(seed: int, *, held: bool, samples: int = 3000) -> Log:
@@ -28,7 +43,7 @@ def driven(seed: int, *, held: bool, samples: int = 3000) -> Log:
     turned = 0.03 * rng.standard_normal(at.size)
     pushed = 1500.0 * rng.standard_normal(at.size)
     now = STEP_S * np.arange(samples + 1)
-    steer, force = np.interp(now, at, turned), np.interp(now, at, pushed)
+    steer, force = (np.interp(now, at, by).tolist() for by in (turned, pushed))
     v_x, v_y, r = 20.0, 0.0, 0.0
     truth = np.empty((samples, 4))
     h = STEP_S / PARTS
@@ -42,20 +57,8 @@ def driven(seed: int, *, held: bool, samples: int = 3000) -> Log:
             turn = steer[k] + share * (steer[k + 1] - steer[k])
             push = force[k] + share * (force[k + 1] - force[k])
 
-            def rates(v_x: float, v_y: float, r: float, turn: float, push: float) -> np.ndarray:
-                front = FRONT * (turn - (v_y + CAR.lf_m * r) / v_x)
-                rear = -REAR * (v_y - CAR.lr_m * r) / v_x
-                return np.array(
-                    [
-                        push / CAR.mass_kg + v_y * r,
-                        (front + rear) / CAR.mass_kg - v_x * r,
-                        (CAR.lf_m * front - CAR.lr_m * rear) / CAR.yaw_inertia_kgm2,
-                    ]
-                )
-
-            x = np.array([v_x, v_y, r])
-            middle = x + 0.5 * h * rates(*x, turn, push)
-            v_x, v_y, r = x + h * rates(*middle, turn, push)
+            u, v, w = moved((v_x, v_y, r), rates(v_x, v_y, r, turn, push), 0.5 * h)
+            v_x, v_y, r = moved((v_x, v_y, r), rates(u, v, w, turn, push), h)
     y = truth + SENSOR_STD * rng.standard_normal(truth.shape)
     names = ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
     columns = dict(zip(names, y.T, strict=True))

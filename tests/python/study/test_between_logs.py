@@ -22,9 +22,9 @@ from sysid_vehicle.study.judge.one_for_all import OneForAll, one_for_all
 from sysid_vehicle.study.results.added import AddedEffect
 
 
-def laps(*cars: Model) -> list[Log]:
-    """Laps of 30 s, each by another car."""
-    lap = manoeuvres.lap(30.0)
+def laps(*cars: Model, duration_s: float = 30.0) -> list[Log]:
+    """Laps, each by another car."""
+    lap = manoeuvres.lap(duration_s)
     return [
         drive(car, lap, seed=662900 + i, rate_hz=50.0, name=f"set {i + 1}")
         for i, car in enumerate(cars)
@@ -85,7 +85,7 @@ def test_what_a_simpler_reason_explains_is_not_confirmed(
     start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lagging = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.06})
-    train, test = laps(lagging, lagging)
+    train, test = laps(lagging, lagging, duration_s=21.0)
 
     def added() -> AddedEffect:
         study = improve(start, train, test, starts=1, candidates=["steer_lag"], sensors=False)

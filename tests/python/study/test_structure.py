@@ -20,7 +20,7 @@ def straight_on(seed: int) -> sv.Log:
 def test_nothing_is_said_of_a_drive_in_which_nothing_happens() -> None:
     """Readings of the speed hold the error of the speed, at constant speed little else."""
     with pytest.warns(sv.SysidWarning):
-        fit = sv.identify(sv.Model(sv.example_vehicle()), straight_on(530217))
+        fit = sv.identify(sv.Model(sv.example_vehicle()), straight_on(530217), starts=1)
     found = structure(fit, Driving.of(straight_on(530218)))
     assert "error of v_x 1 s ahead" in found.test
     assert found.anywhere < 0.05, found.strongest
