@@ -97,8 +97,8 @@ def changed(
     Warns
     -----
     SysidWarning
-        A log is of the reference and of the later driving, with one vehicle file; or the time
-        limit left something out.
+        A log is of the reference and of the later driving, with one vehicle file; a time limit
+        ended the fit of the reference; or this one left something out.
     """
     ends = time.perf_counter() + duration(time_limit_s, "time_limit_s")
     if before.horizon_s:
@@ -119,6 +119,8 @@ def changed(
     if (both := copies(driving.logs, before.driving.logs)) and not another:
         told = "of the reference and of the later driving, and with itself nothing has changed"
         warn(f"{few(both)} {'is' if len(both) == 1 else 'are'} {told}")
+    if before.broken_off:
+        warn("a time limit ended the fit of the reference: what it lacks may look like a change")
     lacks: list[str] = []
     while True:
         in_time = InTime(ends)
