@@ -7,16 +7,13 @@ import time
 from pathlib import Path
 
 from ..diagnose import changed
-from ..errors import warn
-from ..estimate import Driving
 from ..identify import identify
-from ..identify.identify import maximised
 from ..model import Model
 from ..vehicle import Vehicle
 from .log_arguments import LOG_HELP, add_driving, add_effects, add_time_limit, read_logs
 from .outputs import add_json, write_figures
 
-_FITTED, _COMPARED = 0.3, 0.85  # shares of a time limit, at whose ends they are done
+_FITTED, _COMPARED = 0.3, 0.8  # shares of what is left of a time limit; the rest is for last passes
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -50,14 +47,12 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     later = None if args.vehicle_after is None else Vehicle.from_toml(args.vehicle_after)
     before = read_logs(args.logs, args, model.vehicle)
     after = read_logs(args.after, args, later or model.vehicle)
-    if limit is None:
-        found = changed(identify(model, before), after, vehicle=later)
-    else:
-        reference = maximised(model, Driving.of(before), starts=12, ends=began + _FITTED * limit)
-        if not reference.converged:
-            left_out = "the likeliest parameters of the reference"
-            warn(f"the time limit left out {left_out}: what they lack may look like a change")
-        left = began + _COMPARED * limit - time.perf_counter()
-        found = changed(reference, after, vehicle=later, time_limit_s=max(left, 1e-9))
+    ends = None if limit is None else began + limit
+
+    def left_s(share: float) -> float | None:
+        return None if ends is None else max(share * (ends - time.perf_counter()), 1e-9)
+
+    reference = identify(model, before, time_limit_s=left_s(_FITTED))
+    found = changed(reference, after, vehicle=later, time_limit_s=left_s(_COMPARED))
     print(found)
     write_figures(args.json, found.to_dict(), heard)

@@ -28,6 +28,7 @@ from ..log import Log, copies
 from ..model import Model
 from ..rules import USUAL, Rules
 from ..vehicle import Vehicle
+from .change.beside_unknown import acts_on, noise_beside
 from .change.change import Change
 from .change.in_time import InTime
 from .change.may_change import YAW_INERTIA
@@ -37,6 +38,7 @@ from .diagnose import diagnose
 
 _ASKED = 0.3  # of the time that is left, for what the reference lacks
 _LACKS = 2  # effects that are put into the model of a reference, at most
+_ROUNDS = 3  # times that noise is learned beside what no effect explains
 
 
 @typed
@@ -56,10 +58,10 @@ def changed(
     the reference alone shows what is missing in its model (`diagnose`; in other driving only if
     something seems to have changed), or an effect that is in both the same explains more than the
     change, the reference lacks it: it is put into its model, and the drivings are compared again
-    (`Change.lacks`). Both are taken as independent; noise is that of the reference. What a model
-    lacks acts otherwise at other speeds or lateral accelerations: as far as the later driving is
-    there (`Change.alike`), standard errors hold what estimates differ by between pieces of the
-    reference.
+    (`Change.lacks`). Both are taken as independent; noise is that of the reference, but for
+    disturbances that take up what no effect explains (`Change.unknown`). What a model lacks acts
+    otherwise at other speeds or lateral accelerations: as far as the later driving is there
+    (`Change.alike`), standard errors hold what estimates differ by between pieces of the reference.
 
     Parameters
     ----------
@@ -95,8 +97,8 @@ def changed(
     Warns
     -----
     SysidWarning
-        A log is of the reference and of the later driving, with one vehicle file; or the time
-        limit left something out.
+        A log is of the reference and of the later driving, with one vehicle file; a time limit
+        ended the fit of the reference; or this one left something out.
     """
     ends = time.perf_counter() + duration(time_limit_s, "time_limit_s")
     if before.horizon_s:
@@ -117,6 +119,8 @@ def changed(
     if (both := copies(driving.logs, before.driving.logs)) and not another:
         told = "of the reference and of the later driving, and with itself nothing has changed"
         warn(f"{few(both)} {'is' if len(both) == 1 else 'are'} {told}")
+    if before.broken_off:
+        warn("a time limit ended the fit of the reference: what it lacks may look like a change")
     lacks: list[str] = []
     while True:
         in_time = InTime(ends)
@@ -159,7 +163,40 @@ def _compared(
         lack = _named_in(search, candidates)
         if search.in_time.reference:
             change = said.change()
-    return change if lack is None else lack
+    if lack is not None:
+        return lack
+    return _beside_unknown(said, candidates).change() if change.unknown else change
+
+
+def _beside_unknown(said: Saying, candidates: Sequence[str | Effect] | None) -> Saying:
+    """What changed beside what no effect explains, which other changes stood in for.
+
+    Disturbances of the later driving take that up. If nothing unknown is left beside what was found
+    then, the first search had ended elsewhere, and goes on there.
+    """
+    first, here = said.search, said
+    own = InTime(first.in_time.ends)
+    for _ in range(_ROUNDS):
+        put, search = frozenset(here.priced[1].put), here.search
+        parts = [s for key, s in search.visited.items() if key <= put]
+        work = partial(noise_beside, parts, here.unknown, first.before.noise)
+        found = own.of(work, None)
+        if found is None:
+            break
+        start, before = replace(first.start, noise=found.noise), here
+        here = Saying(Search(first.before, start, candidates, first.rules, own))
+        if own.over:
+            break
+        if not here.unknown:
+            first.again(here.priced[1])
+            return Saying(first)
+        same = frozenset(here.priced[1].put) == frozenset(found.put)
+        if same and acts_on(here.unknown) == acts_on(before.unknown):
+            break
+    if own.over:
+        first.in_time.unknown = True
+        return said
+    return here
 
 
 def _named_in(search: Search, candidates: Sequence[str | Effect] | None) -> Effect | None:

@@ -22,7 +22,7 @@ from .._common.text import (
     number,
     text_table,
 )
-from ..errors import NumericalError
+from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
@@ -39,6 +39,10 @@ from .search.tyre_shape import COMBINATIONS
 
 _MEANINGS = {"BCD": "cornering stiffness", "peak": "peak friction", "peak_slip": "slip at the peak"}
 _UNITS = {"cornering stiffness": "N/rad", "peak friction": "1", "slip at the peak": "rad"}
+NOT_FOLLOWED = "the likelihood was not followed to its maximum, and no intervals are told"
+"""Of `Fit.late_facts`: that a time limit ended the search."""
+
+_ENDED = "search ended"
 _OF_TYRES = (0.0, float("inf"))  # no stiffness, friction or slip of a peak is negative
 
 
@@ -83,6 +87,9 @@ class Fit(Estimated):
     pushed : array, shape (n, times)
         Change of the estimates by one standard error of each time by which readings were moved
         (`Log.retimed`); the covariance holds it.
+    late_facts : tuple of str
+        What a time limit left out. Where that ended the search, it is the likeliest that was seen:
+        its estimates have no standard errors, and the covariance is that of the information there.
     """
 
     model: Model
@@ -96,6 +103,17 @@ class Fit(Estimated):
     profiles: tuple[Profile, ...] = ()
     horizon_s: float = 0.0
     pushed: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    late_facts: tuple[str, ...] = ()
+
+    @property
+    def broken_off(self) -> bool:
+        """Whether a time limit ended the search before the maximum of the likelihood."""
+        return NOT_FOLLOWED in self.late_facts
+
+    def without_intervals(self) -> Fit:
+        """The same with estimates whose standard errors nobody knows."""
+        few = (replace(e, std=np.inf, note=_ENDED, unbounded=None) for e in self.estimates)
+        return replace(self, estimates=tuple(few))
 
     @property
     def by_noise(self) -> FloatArray:  # noqa: D102 - as of all fits
@@ -156,6 +174,8 @@ class Fit(Estimated):
             note = "no peak" if not np.isfinite(std) else "not determined" if wide else ""
             if not note and what.name in beyond:
                 note = "extrapolated"
+            if self.broken_off:
+                std, note = np.inf, _ENDED
             found.append(Estimate(what.name, value, std, unit, note, bounds=_OF_TYRES))
         return tuple(profiled(e, self.profiles) for e in found)
 
@@ -171,7 +191,7 @@ class Fit(Estimated):
     @property
     def against_priors(self) -> tuple[AgainstPrior, ...]:
         """Priors that the data contradict, the surest first; of the likelihood's maximum alone."""
-        if self.horizon_s:
+        if self.horizon_s or self.broken_off:
             return ()
         own = self.model.offset_names if self.driving.offsets else ()
         told = {n: prior for n, prior in self.model.priors.items() if n not in own}
@@ -228,9 +248,14 @@ class Fit(Estimated):
         Raises
         ------
         InvalidInput
-            For another method, where emcee is not installed, or where hardly any draw lies within
-            the bounds.
+            For another method, where emcee is not installed, where hardly any draw lies within the
+            bounds, or of a fit that a time limit broke off.
         """
+        if self.broken_off:
+            raise InvalidInput(
+                "the time limit ended the search of this fit, and what the driving leaves open is "
+                "not known; identify with a longer time_limit_s, or without"
+            )
         return posterior(
             self,
             self.model,
@@ -298,7 +323,9 @@ class Fit(Estimated):
         return self.noise.text(self.driving.present)
 
     def _warnings(self) -> list[str]:
-        return [f"Warning: {against}" for against in self.against_priors]
+        late = [f"the time limit ended the fit: {'; '.join(self.late_facts)}"]
+        several = [*(late if self.late_facts else ()), *map(str, self.against_priors)]
+        return [f"Warning: {text}" for text in several]
 
     def _by_log(self) -> list[str]:
         """Lines on the logs whose nuisances differ; the table has their means."""
@@ -313,7 +340,7 @@ class Fit(Estimated):
         return (
             html_paragraph(self._headline())
             + html_table(self._head, self._rows())
-            + (html_list(self._warnings()) if self.against_priors else "")
+            + (html_list(warnings) if (warnings := self._warnings()) else "")
             + (html_list(self._by_log()) if self.driving.offsets else "")
             + html_text(self._noise())
         )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
 
+from .._common.arguments import duration
 from .._common.arrays import FloatArray, as_float64
 from .._common.text import few
 from .._common.threads import before
@@ -20,7 +22,7 @@ from ..model import Model
 from .ahead.ahead import predicting_ahead
 from .beside_noise import beside_noise
 from .contained import above_contained
-from .fit import Fit
+from .fit import NOT_FOLLOWED, Fit
 from .intervals.estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .kinds_of_noise import on_its_road, with_coloured_sensors
 from .maximum import THINNED, another_top, log_likelihood_of, objectives, refine, summary, top
@@ -34,6 +36,7 @@ from .search.usual_tyres import from_usual_tyres
 from .suspects import explaining
 
 _STARTED = 0.3  # of the time that a search has, for its starts
+_NO_PROFILES = "profiles were not finished: intervals are those of the information matrix"
 _OFFSETS = 2  # times that offsets of logs are found, and noise of other time scales is tried
 _OF_PLACES = ("ins_lever_arm", "imu_lever_arm", "speed_sensor_lever_arm")
 
@@ -53,6 +56,7 @@ def identify(
     horizon_s: float = 0.0,
     seed: int = 0,
     workers: int | None = None,
+    time_limit_s: float | None = None,
     progress: bool | None = None,
 ) -> Fit:
     """Estimate a model's free parameters, and the noise, by maximum likelihood.
@@ -89,6 +93,11 @@ def identify(
         Of the start points.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
+    time_limit_s : float, optional
+        After so many seconds the fit ends, wherever it is, but for some passes over the data. The
+        starts have a share of the time. A search that was ended gives the likeliest that was seen,
+        which has not converged and tells no intervals; profiles and predictions ahead that were
+        not finished are left out. A warning and `Fit.late_facts` tell what was left out.
     progress : bool, optional
         Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
@@ -105,7 +114,14 @@ def identify(
         cannot be of this car: another mass, another steering ratio.
     NumericalError
         No start led anywhere.
+
+    Warns
+    -----
+    SysidWarning
+        Priors that the data contradict, a log that is given twice, effects that the logs cannot
+        show; or the time limit left something out.
     """
+    ends = time.perf_counter() + duration(time_limit_s, "time_limit_s")
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
     if intervals not in INTERVALS:
@@ -121,12 +137,25 @@ def identify(
         seed=seed,
         workers=workers,
         progress=progress,
+        ends=ends,
     )
     for against in fit.against_priors:
         warn(str(against))
-    if intervals == "profile":
-        return profile_fit(fit, workers=workers, progress=progress)
-    return predicting_ahead(fit, horizon_s) if horizon_s else fit
+    if intervals == "profile" and not fit.broken_off:
+        work = partial(profile_fit, fit, workers=workers, progress=progress)
+        fit = before(ends, work, None) or _late(fit, _NO_PROFILES)
+    elif horizon_s:
+        ahead = None
+        if not fit.broken_off:
+            ahead = before(ends, partial(predicting_ahead, fit, horizon_s), None)
+        fit = ahead or _late(fit, f"it was not fitted to predictions {horizon_s:g} s ahead")
+    if fit.late_facts:
+        warn(f"the time limit ended the fit: {'; '.join(fit.late_facts)}")
+    return fit.without_intervals() if fit.broken_off else fit
+
+
+def _late(fit: Fit, *facts: str) -> Fit:
+    return replace(fit, late_facts=(*fit.late_facts, *facts))
 
 
 def maximised(
@@ -163,7 +192,7 @@ def maximised(
         return _maximised(model, driving, starts, method, seed, workers, progress, ends)
 
     fit = maximum(model)
-    return fit if np.isfinite(ends) else above_contained(fit, model, maximum)
+    return before(ends, lambda: above_contained(fit, model, maximum), fit)
 
 
 def _maximised(
@@ -189,9 +218,14 @@ def _maximised(
         found = minimise(thin, begin, frozen, box, method=method, tolerance=0.1)
         return box.put(begin, found.x), level - found.cost
 
+    late: list[FloatArray] = []
+
     def in_time(begin: FloatArray) -> tuple[FloatArray, float]:
         found = before(started, lambda: search(begin), None)
-        return found or (begin, level - thin.problem.half_sum_of_squares(begin, frozen))
+        if found is None:
+            late.append(begin)
+            found = begin, level - thin.problem.half_sum_of_squares(begin, frozen)
+        return found
 
     now = time.perf_counter()
     started = now + _STARTED * (ends - now)
@@ -205,14 +239,16 @@ def _maximised(
     def found() -> Fit:
         return _from_ends(model, driving, objective, thinned, few, noise, table)
 
+    facts = (f"{len(late)} of {len(begins)} starts were not searched to their ends",)
     fit = before(ends, found, None)
     if fit is not None:
-        return beside_noise(fit)
+        return _late(beside_noise(fit), *(facts if late else ()))
     seen = [s for s in (o.likeliest for o in (objective, *thinned)) if s is not None]
     every = [(s.p, s.noise) for s in seen] or [(few[0], noise.vector())]
     likeliest = max(every, key=lambda at: log_likelihood_of(objective, *at))
-    return summary(
-        model, driving, objective, likeliest[0], NoiseModel.from_vector(likeliest[1]), table, False
+    noise = NoiseModel.from_vector(likeliest[1])
+    return _late(
+        summary(model, driving, objective, likeliest[0], noise, table, False), NOT_FOLLOWED
     )
 
 

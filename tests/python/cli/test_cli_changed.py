@@ -52,7 +52,14 @@ def test_another_vehicle_file_is_the_later_car(
     vehicle.replace(mass_kg=1500.0).to_toml(heavier)
     asked: list[tuple[sv.Fit, list[sv.Log], sv.Vehicle | None]] = []
 
-    def kept(before: sv.Fit, after: list[sv.Log], *, vehicle: sv.Vehicle | None) -> None:
+    def kept(
+        before: sv.Fit,
+        after: list[sv.Log],
+        *,
+        vehicle: sv.Vehicle | None,
+        time_limit_s: float | None,
+    ) -> None:
+        assert time_limit_s is None
         asked.append((before, after, vehicle))
         raise sv.SysidError("asked")
 
@@ -88,7 +95,8 @@ def test_a_time_limit_ends_the_command_and_says_what_it_left_out(
     out, err = capsys.readouterr()
     assert out.startswith("no change is shown by what was tried in time")
     assert "the time limit ended the comparison: " in err
-    assert "the likeliest parameters of the reference" in err
+    assert "the time limit ended the fit: the likelihood was not followed to its maximum" in err
+    assert "ended the fit of the reference: what it lacks may look like a change" in err
     told = json.loads(figures.read_text(encoding="utf-8"))
     assert any("gyro_bias" in fact for fact in told["late_facts"])
     assert told["effects"]["gyro_bias"]["said"] != "unchanged"

@@ -162,7 +162,7 @@ def test_both_drivings_are_one_problem(fit: Fit, course: Log) -> None:
     problems = [d.problem(model) for d in (Driving.of(course), fit.driving)]
     names = ("D_front", "steer_offset.offset_rad")
     shared, apart = (model.parameters[n].column for n in names)
-    both = BothDrivings(*problems, model.vector(), [shared])
+    both = BothDrivings(*problems, model.vector(), [shared], noise)
     p = model.vector()
     p[[shared, apart]] += [0.01, 0.003]
     kept = p.copy()

@@ -129,6 +129,9 @@ def test_no_car_has_tyres_beyond_any(both: Model, fit: Fit, course: Log) -> None
     beyond[known[f"{FRICTION}.relative_error"].column] = 1.0
     with pytest.raises(NumericalError, match="beyond those of any car"):
         problem.freeze(beyond, noise)
+    gains, columns = problem.freeze(p, noise), [known["D_front"].column]
+    assert problem.half_sum_of_squares(beyond, gains) == np.inf  # searches turn back from there
+    assert problem.normal_equations(beyond, gains, columns)[0] == np.inf
     alone, lost = problem.log_likelihoods(np.array([p, beyond]), noise)
     assert lost == -np.inf
     assert alone == pytest.approx(problem.log_likelihoods(p[None], noise)[0])

@@ -22,6 +22,7 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle._common.text import number
+from sysid_vehicle.diagnose.candidates.causes import CredibleSet
 from sysid_vehicle.diagnose.change.changes_compete import Competition
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
@@ -118,6 +119,14 @@ def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
     small = replace(likely, said="negligible")
     assert str(replace(offset, effects=(small,))).startswith("no change is shown\n")
     assert contradictions_of_changes(text) == []
+
+
+def test_what_no_effect_explains_is_printed_as_a_group(offset: Change) -> None:
+    """Forces and accelerations that these drives do not tell apart."""
+    along = CredibleSet(("unknown F_x", "unknown dv_x/dt"), (0.6, 0.4))
+    several = offset.causes.only([*offset.causes.sets, along], {})
+    first = str(replace(offset, causes=several)).split("\n", maxsplit=1)[0]
+    assert first.endswith("something changed that no effect explains, in F_x or dv_x/dt")
 
 
 def test_what_is_not_testable_has_no_probability(none: Change, offset: Change) -> None:

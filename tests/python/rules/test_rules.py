@@ -24,8 +24,11 @@ PACKAGE = Path(__file__).resolve().parents[3] / "python" / "sysid_vehicle"
 # Constants of numerical methods and of effort: how finely, how long, how often. They decide no
 # claim. Those of the last group shape how what no name fits is described; no effect is claimed.
 NUMERICAL = {
+    "diagnose/change/beside_unknown.py": {  # where noise begins to be learned, and for how long
+        "_MOST", "_ROUNDS", "_TINY", "_TIME_S", "_ROAD", "_COLOUR",
+    },
     "diagnose/change/beside_reference.py": {"_RIDGE"},
-    "diagnose/changed.py": {"_LACKS", "_ASKED"},  # rounds, and a share of time
+    "diagnose/changed.py": {"_LACKS", "_ASKED", "_ROUNDS"},  # rounds, and a share of time
     "diagnose/change/changes_compete.py": {"_SINGULAR", "_MOST"},
     "diagnose/change/both_axles.py": {"_USUAL"},  # prior sizes of changes
     "diagnose/change/may_change.py": {"_INERTIA", "_LARGEST_SLIP_RAD", "_PARTS"},

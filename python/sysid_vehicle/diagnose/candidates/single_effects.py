@@ -272,7 +272,8 @@ class ScoreModel:
         few = tuple(whole[e] for e in effects)
         more = [(h, prior) for h, prior in zip(self.hypotheses, self._log_prior, strict=True)
                 if h.name not in effects]  # fmt: skip
-        alone, *together = self._log_factors([few, *((*few, h) for h, _ in more)])
+        together = self._log_factors([(*few, h) for h, _ in more])
+        alone = self._log_factors([few])[0] if few else 0.0
         found: dict[str, float] = {}
         for (h, prior), log_bf in zip(more, together, strict=True):
             log_odds = float(prior + log_bf - alone)

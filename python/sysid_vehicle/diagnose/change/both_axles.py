@@ -201,8 +201,10 @@ class Scaled:
         return self.problem.residuals(self._car(p), gains)
 
     def half_sum_of_squares(self, p: FloatArray, gains: Any) -> float:
-        """Half the sum of their squares."""
-        return self.problem.half_sum_of_squares(self._car(p), gains)
+        """Half the sum of their squares; infinite beyond any car, from where searches turn back."""
+        with suppress(NumericalError):
+            return self.problem.half_sum_of_squares(self._car(p), gains)
+        return np.inf
 
     def sensitivities(self, p: FloatArray, gains: Any, columns: list[int]) -> FloatArray:
         """Minus the derivatives of the residuals by the parameters `columns`."""
@@ -213,7 +215,10 @@ class Scaled:
         self, p: FloatArray, gains: Any, columns: list[int]
     ) -> tuple[float, FloatArray, FloatArray]:
         """Half the sum of squares, G' e and G' G of the sensitivities G."""
-        own, turn = self._turn(p, columns)
+        try:
+            own, turn = self._turn(p, columns)
+        except NumericalError:
+            return np.inf, np.zeros(len(columns)), np.zeros((len(columns), len(columns)))
         cost, descent, information = self.problem.normal_equations(self._car(p), gains, own)
         return cost, as_float64(turn.T @ descent), as_float64(turn.T @ information @ turn)
 

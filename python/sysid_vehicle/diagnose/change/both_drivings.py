@@ -35,12 +35,15 @@ class BothDrivings:
         Of `before`.
     shared : sequence of int
         Columns of parameters that are in both the same.
+    noise : array, shape (noises,)
+        Of the later driving; what is given is that of the reference.
     """
 
     later: OneDriving
     before: OneDriving
     own: FloatArray
     shared: Sequence[int]
+    noise: FloatArray
 
     @property
     def samples(self) -> int:
@@ -49,7 +52,8 @@ class BothDrivings:
 
     def freeze(self, p: FloatArray, noise: FloatArray) -> _Gains:
         """Gains of both filters."""
-        later, before = self.later.freeze(p, noise), self.before.freeze(self._own(p), noise)
+        later = self.later.freeze(p, self.noise)
+        before = self.before.freeze(self._own(p), noise)
         return _Gains(later, before, float(later.log_likelihood + before.log_likelihood))
 
     def residuals(self, p: FloatArray, gains: _Gains) -> FloatArray:
@@ -81,14 +85,15 @@ class BothDrivings:
         return float(one[0] + cost), as_float64(one[1]), as_float64(one[2])
 
     def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Log-likelihood, its derivatives by the noise's logarithms, and their information."""
-        one, other = self.later.noise_score(p, noise), self.before.noise_score(self._own(p), noise)
-        return one[0] + other[0], as_float64(one[1] + other[1]), as_float64(one[2] + other[2])
+        """Log-likelihood, its derivatives by the logarithms of `noise`, and their information."""
+        value, slope, information = self.before.noise_score(self._own(p), noise)
+        more = float(self.later.freeze(p, self.noise).log_likelihood)
+        return value + more, slope, information
 
     def log_likelihoods(self, sets: FloatArray, noise: FloatArray) -> FloatArray:
         """Of sets of parameters, a row each; minus infinity where one fails."""
         own = np.array([self._own(p) for p in sets])
-        later = self.later.log_likelihoods(sets, noise)
+        later = self.later.log_likelihoods(sets, self.noise)
         return as_float64(later + self.before.log_likelihoods(own, noise))
 
     def _own(self, p: FloatArray) -> FloatArray:

@@ -28,7 +28,8 @@ class Change(Printed):
         The reference.
     after : Fit
         Its model with the changes that were found, on the later driving, under the noise of the
-        reference; nothing else was fitted to the later driving alone.
+        reference. Where no effect explains a change, disturbances along what that acts on are as
+        large as the later driving asks for. Nothing else was fitted to it alone.
     causes : Causes
         Posterior of a sum of single changes: inclusion probabilities, credible sets. Of each set
         what was fitted together with those of the others stands first. What begins with `unknown`
@@ -111,7 +112,8 @@ class Change(Printed):
         ]
         what = f"changed: {'; '.join(told)}" if told else ""
         if self.unknown:
-            kinds = ", ".join(s.effects[0].removeprefix(UNKNOWN) for s in self.unknown)
+            several = [[e.removeprefix(UNKNOWN) for e in s.effects] for s in self.unknown]
+            kinds = ", ".join(" or ".join(few) for few in several)
             more = f"something changed that no effect explains, in {kinds}"
             return f"{what}; beside it {more}" if what else more
         if what:

@@ -53,6 +53,7 @@ class Competition:
         By parameter: the change beside what was put in, in place of what acts like it.
     stds_beside : dict of str to float
         The same beside all that was put in.
+    scores : ScoreModel
     causes : Causes
     alone : tuple of str
         What may have changed by itself, the likeliest first.
@@ -321,6 +322,7 @@ class Competition:
         )
         named = (h for h in self._hypotheses if not h.name.startswith(UNKNOWN))
         known = replace(model, hypotheses=tuple(named))
+        self.scores = model
         self.beside_put = model.beside(self.put) if self.put else {}
         alone = tuple(e for s in known.subsets(1) for e in s.effects)
         parameters = {m.id: m.parameters for m in self._may}

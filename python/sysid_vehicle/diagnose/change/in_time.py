@@ -32,12 +32,14 @@ class InTime:
         Whether not all was tried that may hold only together.
     maxima : bool
         Whether searches were not followed to the maximum of the likelihood.
+    unknown : bool
+        Whether it was not asked what changed beside what no effect explains.
     """
 
     def __init__(self, ends: float = math.inf) -> None:
         self.ends = ends
         self.late: dict[frozenset[str], tuple[str, ...]] = {}
-        self.reference = self.twos = self.maxima = False
+        self.reference = self.twos = self.maxima = self.unknown = False
 
     @property
     def over(self) -> bool:
@@ -81,4 +83,6 @@ class InTime:
             told.append("what the reference lacks was not asked for, and may look like a change")
         if self.maxima:
             told.append("the likelihood was not followed to its maximum")
+        if self.unknown:
+            told.append("what stands in for what no effect explains was not asked for")
         return tuple(told)

@@ -146,6 +146,16 @@ def beyond(
     return 1.0 - kept
 
 
+def within(least: float, most: float) -> float:
+    """A change that is larger than any is none."""
+    return least if least <= most else np.inf
+
+
+def shown(std: float, ends: tuple[float, float]) -> float:
+    """A standard error; infinite where it is larger than all that its parameter may be."""
+    return std if std < ends[1] - ends[0] else np.inf
+
+
 def forces_of_tyre(
     before: Sequence[float], change: Sequence[float], friction: float
 ) -> Iterator[tuple[float, tuple[FloatArray, FloatArray]]]:

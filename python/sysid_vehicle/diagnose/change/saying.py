@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -10,24 +11,19 @@ import scipy
 
 from ..._common.arrays import as_float64
 from ...effects import Effect
-from ..candidates.causes import Causes, CredibleSet
+from ..candidates.causes import UNKNOWN, Causes, CredibleSet
 from ..candidates.possible import possible
+from .beside_unknown import unknown_beside
 from .change import Change
 from .changes_compete import Competition
 from .effect_change import EffectChange, Said
-from .may_change import May, beyond, room
+from .may_change import May, beyond, room, shown, within
 from .reference import Exact
 from .search import Search
 
 
-def _within(least: float, most: float) -> float:
-    """A change that is larger than any is none."""
-    return least if least <= most else np.inf
-
-
-def _shown(std: float, ends: tuple[float, float]) -> float:
-    """A standard error; infinite where it is larger than all that its parameter may be."""
-    return std if std < ends[1] - ends[0] else np.inf
+def _unknown(several: CredibleSet) -> bool:
+    return several.effects[0].startswith(UNKNOWN)
 
 
 class Saying:
@@ -45,6 +41,25 @@ class Saying:
             return self.told
         return self.search.told(self.state, at_one_point=True)
 
+    @cached_property
+    def priced(self) -> tuple[Competition, Exact]:
+        """What is worth its price of what was put in, and what competes beside it."""
+        return self.search.worth_their_price(self.told, self.state)
+
+    @cached_property
+    def unknown(self) -> tuple[CredibleSet, ...]:
+        """What changed beside it that no effect explains, under the noise of the reference."""
+        told, few = self.priced
+        noise = self.search.before.noise
+        if few.fit.noise is not noise:
+            few = replace(few, fit=replace(few.fit, noise=noise))
+            told = self.search.told(few)
+        # A sum of many shapes is like any effect: lines tell whether it is there beside that.
+        apart = (s for s in told.causes.sets if {*few.put}.isdisjoint(s.effects))
+        if not any(map(_unknown, apart)):
+            return ()
+        return unknown_beside(told.scores, few.put, self.search.rules)
+
     def change(self) -> Change:
         """Exact likelihoods decide on what was put in, scores on all else.
 
@@ -52,11 +67,12 @@ class Saying:
         which would be taken for a part of them otherwise.
         """
         search, told, state = self.search, self.told, self.state
-        priced, few = search.worth_their_price(told, state)
+        priced, few = self.priced
         ratio = priced.ratio_of(few.put)
         exact = {e: self._exact(e, few, priced, ratio) for e in few.put}
         shown = [s for s in exact.values() if s is not None]
-        causes = priced.causes.only([*shown, *self._not_refused(priced, few)], {})
+        named = [s for s in self._not_refused(priced, few) if not _unknown(s)]
+        causes = priced.causes.only([*shown, *named, *self.unknown], {})
         sizes, stds = self._told_sizes(shown, few)
         nothing = search.nothing(told)
         late = search.in_time.effects(state.put)
@@ -290,7 +306,7 @@ class Saying:
         told_by = [(1.0 - cut) * v for v in raw[0]]
         value = tuple(float(np.clip(v, *both)) for v, both in zip(told_by, ends, strict=True))
         std = tuple(
-            _shown(max(s, cut * abs(v)), both) for v, s, both in zip(*raw, ends, strict=True)
+            shown(max(s, cut * abs(v)), both) for v, s, both in zip(*raw, ends, strict=True)
         )
         bound = tuple(
             min(abs(v) + rules.bound * s, max(-low, high))
@@ -298,7 +314,7 @@ class Saying:
         )
         matters = [p.matters for p in m.parameters]
         least = tuple(
-            _within(max(told.least(s, usual), w + (rules.bound - 1.0) * s), max(-low, high))
+            within(max(told.least(s, usual), w + (rules.bound - 1.0) * s), max(-low, high))
             for s, usual, w, (low, high) in zip(std, m.scale, matters, ends, strict=True)
         )
         small = all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True))
@@ -378,4 +394,4 @@ class Saying:
             value = (1.0 - cut) * float(later @ [known[n] for n in m.names])
         std = told.std_along(m.id, (later, earlier), known)
         std = max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)
-        return value, _shown(std, (0.0, 1.0))  # an error of all of it tells nothing
+        return value, shown(std, (0.0, 1.0))  # an error of all of it tells nothing

@@ -337,6 +337,10 @@ class Search:
             else:
                 self.visited |= {key: exact, frozenset(): self.reference.nothing}
 
+    def again(self, other: Exact) -> None:
+        """What a search under other noise ended with, under this one."""
+        self._visit(other.put, self.singles, (other.changes,))
+
     def lacking(self, effect: str, state: Exact, group: Sequence[str]) -> list[Exact]:
         """What was fitted, to its maximum, without an effect and all of its group.
 

@@ -50,7 +50,9 @@ def together(
     problem: Predicting = later
     if own is not None:
         shared = [own.parameters[n].column for n in own.free_names if n not in changed]
-        problem = BothDrivings(later, Scaled.of(before.driving, own), own.vector(), shared)
+        problem = BothDrivings(
+            later, Scaled.of(before.driving, own), own.vector(), shared, start.noise.vector()
+        )
     stays = gaussian_prior(_core.PARAMETERS, priors)
     return Objective(problem, stays, *noise_range(model.vehicle, start.driving))
 
