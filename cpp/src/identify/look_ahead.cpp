@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <map>
 #include <stdexcept>
+#include <utility>
 
 #include "sysid/identify/in_time.hpp"
 #include "sysid/identify/lane_filter.hpp"
@@ -58,12 +59,13 @@ class FilteredStates {
     std::vector<std::vector<double>> runs_;
 };
 
-/// Forces are not foreseen. The slope of the road is that of the smoother, as nothing of the car
-/// foretells it; where it has to be foreseen, it fades from where it is known.
+/// Forces are not foreseen. The slope of the road is `road`, kRoadStates per sample, as nothing of
+/// the car foretells it; without, it fades from where it is known.
 class Predictions {
   public:
     Predictions(const Problem& problem, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, bool readings, double* errors)
+                const std::vector<Horizon>& horizons, std::vector<double> road, bool readings,
+                double* errors)
         : problem_(problem),
           p_(p),
           noise_(noise),
@@ -74,11 +76,8 @@ class Predictions {
           filtered_(problem, p, noise),
           model_(problem.model, p, {}, noise.disturbances()),
           rate_(problem.model.fastest_rate(p, 1.0)),
-          state_(model_.moving()) {
-        if (readings || !noise.sloping()) return;
-        road_.resize(samples_ * kRoadStates);
-        if (!smoothed_road(problem, p, noise, road_.data())) road_.clear();
-    }
+          state_(model_.moving()),
+          road_(std::move(road)) {}
 
     void of_run(std::size_t number, std::size_t offset) {
         number_ = number;
@@ -213,7 +212,12 @@ void look_ahead(const Problem& logged, const double* p, const Noise& noise,
     for (const Horizon& h : horizons)
         if (h.every == 0) throw std::invalid_argument("every = 0: give one or more");
     std::fill_n(errors, horizons.size() * problem.samples() * kChannels, std::nan(""));
-    Predictions predictions(problem, p, noise, horizons, readings, errors);
+    std::vector<double> road;
+    if (!readings && noise.sloping()) {
+        road.resize(problem.samples() * kRoadStates);
+        if (!smoothed_road(logged, p, noise, road.data())) road.clear();
+    }
+    Predictions predictions(problem, p, noise, horizons, std::move(road), readings, errors);
     std::size_t offset = 0;
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         predictions.of_run(i, offset);

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "helpers.hpp"
+#include "sysid/dynamics/steer_delay.hpp"
 #include "sysid/identify/prediction_error.hpp"
 
 namespace sysid::test {
@@ -152,6 +153,20 @@ TEST(LookAhead, ErrorsKnowTheSlopesToComeAndReadingsDoNot) {
             EXPECT_GT(without, 3.0 * count) << c << " of " << samples;
         }
     }
+}
+
+TEST(LookAhead, SlopesAreThoseOfSteeringAsItActs) {
+    const SingleTrack model{saloon(), mask_of({"steer_delay"})};
+    const Parameters p = typical_parameters();
+    ASSERT_GT(std::abs(steer_delay(model, p.data())), 1e-3);
+    sysid::Run run;
+    for (int k = 0; k < 300; ++k) run.inputs.push_back(lively(0.01 * k));
+    run.measurements = drive(model, p, run.inputs, 0.01, 20.0);
+    const Problem problem{model, {run}};
+    std::vector<double> errors(problem.samples() * kChannels);
+    look_ahead(problem, p.data(), sloping_noise(), {{50, 1}}, errors.data());
+    for (std::size_t n = 50 * kChannels; n < errors.size(); ++n)
+        EXPECT_NEAR(errors[n], 0.0, 1e-6) << n;
 }
 
 TEST(LookAhead, OnALevelRoadErrorsAreThoseOfReadings) {
