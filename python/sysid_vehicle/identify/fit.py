@@ -46,6 +46,11 @@ _ENDED = "search ended"
 _OF_TYRES = (0.0, float("inf"))  # no stiffness, friction or slip of a peak is negative
 
 
+def late_sentence(facts: Sequence[str]) -> str:
+    """What a time limit left out of a fit (`Fit.late_facts`)."""
+    return f"the time limit ended the fit: {'; '.join(facts)}"
+
+
 _REACHED: WeakKeyDictionary[Fit, dict[str, float]] = WeakKeyDictionary()
 
 
@@ -323,8 +328,8 @@ class Fit(Estimated):
         return self.noise.text(self.driving.present)
 
     def _warnings(self) -> list[str]:
-        late = [f"the time limit ended the fit: {'; '.join(self.late_facts)}"]
-        several = [*(late if self.late_facts else ()), *map(str, self.against_priors)]
+        late = (late_sentence(self.late_facts),) if self.late_facts else ()
+        several = [*late, *map(str, self.against_priors)]
         return [f"Warning: {text}" for text in several]
 
     def _by_log(self) -> list[str]:

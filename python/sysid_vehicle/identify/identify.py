@@ -22,7 +22,7 @@ from ..model import Model
 from .ahead.ahead import predicting_ahead
 from .beside_noise import beside_noise
 from .contained import above_contained
-from .fit import NOT_FOLLOWED, Fit
+from .fit import NOT_FOLLOWED, Fit, late_sentence
 from .intervals.estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .kinds_of_noise import on_its_road, with_coloured_sensors
 from .maximum import THINNED, another_top, log_likelihood_of, objectives, refine, summary, top
@@ -150,7 +150,7 @@ def identify(
             ahead = before(ends, partial(predicting_ahead, fit, horizon_s), None)
         fit = ahead or _late(fit, f"it was not fitted to predictions {horizon_s:g} s ahead")
     if fit.late_facts:
-        warn(f"the time limit ended the fit: {'; '.join(fit.late_facts)}")
+        warn(late_sentence(fit.late_facts))
     return fit.without_intervals() if fit.broken_off else fit
 
 

@@ -117,7 +117,8 @@ def test_a_driver_who_answers_slopes_makes_the_true_car_err_no_more(
     assert {c.channel for c in found} == {*PREDICTED}
     assert worse(found) == ()
     own = own_share(without, right, driving, (1.0, 2.0), channels=moved_by(truth.parts[0]))
-    assert own.low > 0.0
+    # The speed counts too, whose error the slope takes up in part: less than on the level.
+    assert own.low > (0.03 if slope_rad else 0.05)
 
 
 def test_a_spin_does_not_decide(

@@ -151,7 +151,7 @@ def within(least: float, most: float) -> float:
     return least if least <= most else np.inf
 
 
-def shown(std: float, ends: tuple[float, float]) -> float:
+def finite_std(std: float, ends: tuple[float, float]) -> float:
     """A standard error; infinite where it is larger than all that its parameter may be."""
     return std if std < ends[1] - ends[0] else np.inf
 

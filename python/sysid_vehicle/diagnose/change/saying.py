@@ -17,7 +17,7 @@ from .beside_unknown import unknown_beside
 from .change import Change
 from .changes_compete import Competition
 from .effect_change import EffectChange, Said
-from .may_change import May, beyond, room, shown, within
+from .may_change import May, beyond, finite_std, room, within
 from .reference import Exact
 from .search import Search
 
@@ -306,7 +306,7 @@ class Saying:
         told_by = [(1.0 - cut) * v for v in raw[0]]
         value = tuple(float(np.clip(v, *both)) for v, both in zip(told_by, ends, strict=True))
         std = tuple(
-            shown(max(s, cut * abs(v)), both) for v, s, both in zip(*raw, ends, strict=True)
+            finite_std(max(s, cut * abs(v)), both) for v, s, both in zip(*raw, ends, strict=True)
         )
         bound = tuple(
             min(abs(v) + rules.bound * s, max(-low, high))
@@ -394,4 +394,4 @@ class Saying:
             value = (1.0 - cut) * float(later @ [known[n] for n in m.names])
         std = told.std_along(m.id, (later, earlier), known)
         std = max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)
-        return value, shown(std, (0.0, 1.0))  # an error of all of it tells nothing
+        return value, finite_std(std, (0.0, 1.0))  # an error of all of it tells nothing

@@ -3,6 +3,11 @@
 Medians over blocks of the driving: one spin decides nothing. Where two models are compared, block
 is held against block. Lateral errors count where the car turns, and blocks hold equal times of
 that: on a straight every model predicts that nothing happens.
+
+Where noise has learned a road of varying slope, predictions know the slope to come, as each model's
+smoother tells it from all of the data. Whoever drives answers slopes, and by a model whose force or
+steering does too little that answer moves the car less: not to know the slope would make the true
+car err more than that model.
 """
 
 from __future__ import annotations
