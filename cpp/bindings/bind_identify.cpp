@@ -16,7 +16,7 @@ void add_run(LogwiseProblem& logwise, double dt, const Array& inputs, const Arra
         throw std::invalid_argument("shift: expected one number for each parameter, or none");
     SingleTrack& model = logwise.shifted(shift).model;
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
-    const py::ssize_t own = model.loads_known ? 4 : 2;
+    const py::ssize_t own = 2 + (model.loads_known ? 2 : 0) + (model.slope_known ? 2 : 0);
     const auto width =
         std::clamp<py::ssize_t>(inputs.ndim() == 2 ? inputs.shape(1) : 0, own, own + kUserChannels);
     const double* u = matrix(inputs, n, width, "inputs");
@@ -40,6 +40,10 @@ void add_run(LogwiseProblem& logwise, double dt, const Array& inputs, const Arra
             Axles<double>& most = model.most_n;
             run.inputs[k].loads_n = {u[2], u[3]};
             most = {std::max(most.front, u[2]), std::max(most.rear, u[3])};
+        }
+        if (model.slope_known) {
+            run.inputs[k].gravity_x_mps2 = u[own - 2];
+            run.inputs[k].gravity_y_mps2 = u[own - 1];
         }
         if (!std::all_of(u, u + own, [](double x) { return std::isfinite(x); }))
             throw std::invalid_argument(log + "inputs: not finite at sample " + std::to_string(k));
@@ -70,8 +74,8 @@ py::dict as_dict(const Trace& t) {
     out["innovation"] = copy_of(t.innovation, kChannels);
     out["spread"] = copy_of(t.spread, kChannels);
     out["whitened"] = copy_of(t.whitened, kChannels);
-    out["state"] = copy_of(t.state, kStatesFull);
-    out["state_std"] = copy_of(t.state_std, kStatesFull);
+    out["state"] = copy_of(t.state, kStatesTold);
+    out["state_std"] = copy_of(t.state_std, kStatesTold);
     out["log_density"] = row_of(t.log_density);
     out["log_likelihood"] = t.log_likelihood;
     return out;
@@ -182,7 +186,7 @@ void register_identify(py::module_& m) {
             [](const LogwiseProblem& self, const Array& p, const Array& noise) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
-                return filled(self.samples(), kStatesFull,
+                return filled(self.samples(), kStatesTold,
                               [&](double* to) { smoothed_means(self, values, n, to); });
             },
             py::arg("parameters"), py::arg("noise"))
@@ -191,7 +195,7 @@ void register_identify(py::module_& m) {
             [](const LogwiseProblem& self, const Array& p, const LogwiseFilter& filter) {
                 check_runs(self, filter);
                 const double* values = values_of(p);
-                return filled(self.samples(), kStatesFull,
+                return filled(self.samples(), kStatesTold,
                               [&](double* to) { smoothed_means(self, values, filter, to); });
             },
             py::arg("parameters"), py::arg("filter"))

@@ -251,6 +251,11 @@ void register_model(py::module_& m) {
              py::arg("car"), py::arg("effects"), py::arg("force_known"),
              py::arg("user") = std::vector<User>{}, py::arg("loads_known") = false,
              py::arg("inputs_held") = false)
+        .def("on_known_slopes",
+             [](SingleTrack model) {
+                 model.slope_known = true;
+                 return model;
+             })
         .def("evaluate", &evaluate, py::arg("parameters"), py::arg("motion"), py::arg("steer"),
              py::arg("longitudinal"))
         .def("car", &car_with_effects, py::arg("parameters"));

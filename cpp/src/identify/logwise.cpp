@@ -217,7 +217,7 @@ Trace trace(const LogwiseProblem& logged, const double* p, const LogwiseFilter& 
 void smoothed_means(const LogwiseProblem& logged, const double* p, const Noise& noise,
                     double* out) {
     each(logged, p, [&](const Problem& part, const double* own, std::size_t, std::size_t before) {
-        smoothed_means(part, own, noise, out + before * kStatesFull);
+        smoothed_means(part, own, noise, out + before * kStatesTold);
     });
 }
 
@@ -225,7 +225,7 @@ void smoothed_means(const LogwiseProblem& logged, const double* p, const Logwise
                     double* out) {
     each(logged, p,
          [&](const Problem& part, const double* own, std::size_t number, std::size_t before) {
-             smoothed_means(part, own, filter.parts[number], out + before * kStatesFull);
+             smoothed_means(part, own, filter.parts[number], out + before * kStatesTold);
          });
 }
 

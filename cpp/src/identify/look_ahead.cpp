@@ -59,12 +59,11 @@ class FilteredStates {
     std::vector<std::vector<double>> runs_;
 };
 
-/// Forces are not foreseen. The slope of the road is `road`, kRoadStates per sample, as nothing of
-/// the car foretells it; without, it fades from where it is known.
+/// Forces are not foreseen. The slope of the road is known, or fades from where it is known.
 class Predictions {
   public:
-    Predictions(const Problem& problem, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, std::vector<double> road, bool readings,
+    Predictions(const Problem& problem, FilteredStates filtered, const double* p,
+                const Noise& noise, const std::vector<Horizon>& horizons, bool readings,
                 double* errors)
         : problem_(problem),
           p_(p),
@@ -73,11 +72,10 @@ class Predictions {
           readings_(readings),
           errors_(errors),
           samples_(problem.samples()),
-          filtered_(problem, p, noise),
+          filtered_(std::move(filtered)),
           model_(problem.model, p, {}, noise.disturbances()),
           rate_(problem.model.fastest_rate(p, 1.0)),
-          state_(model_.moving()),
-          road_(std::move(road)) {}
+          state_(model_.moving()) {}
 
     void of_run(std::size_t number, std::size_t offset) {
         number_ = number;
@@ -108,13 +106,9 @@ class Predictions {
     double begin(std::size_t k, std::size_t i) const {
         const double known = filtered_.at(number_, k)[i];
         if (i < model_.states()) return known;
-        return i < model_.states() + kMotionStates ? 0.0 : at(i - model_.states(), k, known);
-    }
-
-    /// Gravity that the smoother tells of a sample, or what else is known.
-    double at(std::size_t external, std::size_t k, double known) const {
-        const std::size_t i = external - kMotionStates;
-        return road_.empty() || i >= kRoadStates ? known : road_[(offset_ + k) * kRoadStates + i];
+        if (i >= model_.states() + kPushes) return known;
+        const bool slope = i >= model_.states() + kMotionStates && !problem_.model.slope_known;
+        return slope ? known : 0.0;
     }
 
     void together(const Run& run, const std::vector<std::size_t>& asked, const std::size_t* starts,
@@ -140,10 +134,8 @@ class Predictions {
                     move_lanes(model_, samples, run.dt, parts[like], state_.data(),
                                [](RecordedModel::Ready&) {});
                     for (std::size_t i = kMotionStates; i < model_.externals(); ++i)
-                        for (std::size_t lane = 0; lane < kLanes; ++lane) {
-                            double& x = state_[model_.states() + i].at[lane];
-                            x = at(i, samples[lane].at, x * noise_.forget(i, run.dt));
-                        }
+                        for (double& x : state_[model_.states() + i].at)
+                            x *= noise_.forget(i, run.dt);
                 });
             }
             const RecordedModel::Ready& ready = read_lanes(model_, samples, state_.data());
@@ -175,7 +167,7 @@ class Predictions {
                 advance(problem_.model, x, external.data(), run.inputs[n], run.inputs[n + 1], p_,
                         run.dt, substeps_for(problem_.model, p_, x[0], run.dt));
                 for (std::size_t i = kMotionStates; i < model_.externals(); ++i)
-                    external[i] = at(i, n + 1, external[i] * noise_.forget(i, run.dt));
+                    external[i] *= noise_.forget(i, run.dt);
             }
             keep(run, h, n, sense(problem_.model, x, external.data(), run.inputs[n], p_));
         }
@@ -199,25 +191,39 @@ class Predictions {
     RecordedModel model_;
     double rate_;
     std::vector<LaneRow> state_;
-    std::vector<double> road_;
     std::size_t number_ = 0, offset_ = 0;
 };
+
+std::vector<double> smoothed_of(const Problem& logged, const double* p, const Noise& noise) {
+    std::vector<double> means(logged.samples() * kStatesTold);
+    smoothed_means(logged, p, noise, means.data());
+    return means;
+}
+
+/// Gravity as smoothed means tell it becomes known: nothing of the car foretells it.
+void tell_slope(Problem& problem, const std::vector<double>& means) {
+    problem.model.slope_known = true;
+    const double* slope = means.data() + kStatesFull;
+    for (Run& run : problem.runs)
+        for (Input& u : run.inputs) {
+            u.gravity_x_mps2 = slope[0];
+            u.gravity_y_mps2 = slope[1];
+            slope += kStatesTold;
+        }
+}
 
 }  // namespace
 
 void look_ahead(const Problem& logged, const double* p, const Noise& noise,
                 const std::vector<Horizon>& horizons, double* errors, bool readings) {
-    const InTime in_time(logged, p);
-    const Problem& problem = *in_time;
     for (const Horizon& h : horizons)
         if (h.every == 0) throw std::invalid_argument("every = 0: give one or more");
-    std::fill_n(errors, horizons.size() * problem.samples() * kChannels, std::nan(""));
-    std::vector<double> road;
-    if (!readings && noise.sloping()) {
-        road.resize(problem.samples() * kRoadStates);
-        if (!smoothed_road(logged, p, noise, road.data())) road.clear();
-    }
-    Predictions predictions(problem, p, noise, horizons, std::move(road), readings, errors);
+    std::fill_n(errors, horizons.size() * logged.samples() * kChannels, std::nan(""));
+    const InTime in_time(logged, p);
+    Problem problem = *in_time;
+    FilteredStates filtered(problem, p, noise);
+    if (!readings && noise.sloping()) tell_slope(problem, smoothed_of(logged, p, noise));
+    Predictions predictions(problem, std::move(filtered), p, noise, horizons, readings, errors);
     std::size_t offset = 0;
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         predictions.of_run(i, offset);

@@ -39,7 +39,8 @@ std::uint64_t digest_of(const Problem& problem) {
     using Car = std::array<double, sizeof(VehicleData) / sizeof(double)>;
     for (const double x : std::bit_cast<Car>(model.car)) digest.add(x);
     digest.add(std::bit_cast<double>(model.effects));
-    for (const bool on : {model.force_known, model.loads_known, model.inputs_held})
+    for (const bool on :
+         {model.force_known, model.loads_known, model.slope_known, model.inputs_held})
         digest.add(on ? 1.0 : 0.0);
     digest.add(model.most_n.front);
     digest.add(model.most_n.rear);
@@ -53,6 +54,9 @@ std::uint64_t digest_of(const Problem& problem) {
             digest.add(u.steer_rate_radps);
             digest.add(u.loads_n.front);
             digest.add(u.loads_n.rear);
+            if (!model.slope_known) continue;
+            digest.add(u.gravity_x_mps2);
+            digest.add(u.gravity_y_mps2);
         }
         for (const Vec<kChannels>& y : run.measurements)
             for (const double x : y) digest.add(x);

@@ -10,7 +10,7 @@ namespace {
 InputFor<Recorded> recorded_input(Recorder& to) {
     InputFor<Recorded> u;
     for (Recorded* x : {&u.steer_rad, &u.longitudinal, &u.time_s, &u.steer_rate_radps,
-                        &u.loads_n.front, &u.loads_n.rear})
+                        &u.loads_n.front, &u.loads_n.rear, &u.gravity_x_mps2, &u.gravity_y_mps2})
         *x = to.input(false);
     for (Recorded& x : u.channels) x = to.input(false);
     return u;
@@ -22,7 +22,9 @@ double number_of(const Input& u, std::size_t i) {
     if (i == 2) return u.time_s;
     if (i == 3) return u.steer_rate_radps;
     if (i == 4) return u.loads_n.front;
-    return i == 5 ? u.loads_n.rear : u.channels[i - 6];
+    if (i == 5) return u.loads_n.rear;
+    if (i == 6) return u.gravity_x_mps2;
+    return i == 7 ? u.gravity_y_mps2 : u.channels[i - 8];
 }
 
 /// Whether two programs differ in numbers that are the same for all samples alone.

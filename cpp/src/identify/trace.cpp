@@ -16,8 +16,8 @@ template <int NX>
 void store_state(const RunSystem<NX>& system, Trace& out, const Vec<NX>& mean,
                  const Mat<NX, NX>& covariance) {
     const std::size_t begin = out.state.size();
-    out.state.resize(begin + kStatesFull, std::nan(""));
-    out.state_std.resize(begin + kStatesFull, std::nan(""));
+    out.state.resize(begin + kStatesTold, std::nan(""));
+    out.state_std.resize(begin + kStatesTold, std::nan(""));
     const auto store = [&](std::size_t to, int from) {
         out.state[begin + to] = mean[from];
         out.state_std[begin + to] = std::sqrt(std::max(covariance(from, from), 0.0));
@@ -27,6 +27,9 @@ void store_state(const RunSystem<NX>& system, Trace& out, const Vec<NX>& mean,
     for (int i = 0; i < std::min(system.packed(0), NX); ++i) store(static_cast<std::size_t>(i), i);
     for (std::size_t i = 0; i < system.own().count; ++i)
         store(kMotionStates + system.place(i), system.packed(i));
+    const auto pushes = std::min<std::size_t>(system.disturbances(), kPushes);
+    for (std::size_t i = kMotionStates; i < pushes; ++i)
+        store(kStatesFull + i - kMotionStates, system.disturbing(i));
 }
 
 template <int NX>
@@ -82,12 +85,12 @@ void add_told(const FrozenFilter& filter, std::size_t run, std::size_t k, Trace&
     out.log_density.push_back(whitener.diagonal().array().log().sum());
     const std::size_t begin = out.state.size();
     for (std::vector<double>* all : {&out.state, &out.state_std}) {
-        all->resize(begin + kStatesFull, std::nan(""));
+        all->resize(begin + kStatesTold, std::nan(""));
         std::fill_n(all->begin() + static_cast<long>(begin), kStatesPlain, 0.0);
     }
     for (std::size_t i = 0; i < n; ++i) {
         const auto row = static_cast<std::size_t>(filter.rows[i]);
-        if (row >= kStatesFull) continue;
+        if (row >= kStatesTold) continue;
         out.state[begin + row] = mean[i];
         out.state_std[begin + row] = std::sqrt(std::max(known[LaneFilter::packed(i, i)], 0.0));
     }
@@ -104,15 +107,14 @@ std::vector<std::size_t> first_samples(const Problem& problem) {
     return first;
 }
 
-/// Where smoothed means go: `width` per sample, by the names of `filter_rows`.
+/// Where smoothed means go: kStatesTold per sample, by the names of `filter_rows`.
 struct Means {
     double* out;
-    std::size_t width = kStatesFull;
 
-    double* at(std::size_t sample) const { return out + sample * width; }
+    double* at(std::size_t sample) const { return out + sample * kStatesTold; }
     /// States that a car always has are zero, others unknown.
     void clear(std::size_t samples) const {
-        std::fill_n(out, samples * width, std::nan(""));
+        std::fill_n(out, samples * kStatesTold, std::nan(""));
         for (std::size_t k = 0; k < samples; ++k) std::fill_n(at(k), kStatesPlain, 0.0);
     }
 };
@@ -124,13 +126,8 @@ struct Means {
 class MeansBackwards {
   public:
     MeansBackwards(const Run& run, const Noise& noise, std::size_t moving,
-                   const std::vector<int>& rows, std::size_t width)
-        : run_(run),
-          moving_(moving),
-          rows_(rows),
-          width_(width),
-          later_(rows.size(), 0.0),
-          before_(rows.size()) {
+                   const std::vector<int>& rows)
+        : run_(run), moving_(moving), rows_(rows), later_(rows.size(), 0.0), before_(rows.size()) {
         for (std::size_t d = 0; d < noise.disturbances(); ++d)
             forget_.push_back(noise.forget(d, run.dt));
     }
@@ -144,7 +141,7 @@ class MeansBackwards {
                 sum += s.covariance[LaneFilter::packed(std::max(i, j), std::min(i, j))] * later_[j];
             if (!std::isfinite(sum)) return false;
             const auto row = static_cast<std::size_t>(rows_[i]);
-            if (row < width_) out[row] = sum;
+            if (row < kStatesTold) out[row] = sum;
         }
         std::array<double, kChannels> told{};  // inverse covariance times innovation
         for (std::size_t i = 0, entry = 0; i < kChannels; entry += ++i) {
@@ -171,7 +168,6 @@ class MeansBackwards {
     const Run& run_;
     std::size_t moving_;
     const std::vector<int>& rows_;
-    std::size_t width_;
     std::vector<double> forget_, later_, before_;
 };
 
@@ -193,7 +189,7 @@ bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise
     to.clear(problem.samples());
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         const Run& run = problem.runs[i];
-        MeansBackwards means(run, noise, moving, rows, to.width);
+        MeansBackwards means(run, noise, moving, rows);
         for (std::size_t k = run.size(); k-- > 0;) {
             poll_interrupt(k);
             const double* from = numbers.data() + (first[i] + k) * wide;
@@ -213,7 +209,7 @@ bool means_along(const Problem& problem, const double* p, const FrozenFilter& fi
     const std::vector<std::size_t> first = first_samples(problem);
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         const Run& run = problem.runs[i];
-        MeansBackwards means(run, filter.noise, path.moving(), filter.rows, to.width);
+        MeansBackwards means(run, filter.noise, path.moving(), filter.rows);
         for (std::size_t end = run.size(); end > 0;) {
             poll_interrupt();
             const std::size_t count = std::min(ToldPath::kTogether, end);
@@ -225,14 +221,6 @@ bool means_along(const Problem& problem, const double* p, const FrozenFilter& fi
         }
     }
     return true;
-}
-
-/// Means without covariances; false where there are too few numbers for that, or it fails.
-bool means_alone(const Problem& logged, const double* p, const Noise& noise, const Means& to) {
-    const InTime in_time(logged, p);
-    return means_in_pieces(*in_time, p, noise, to) ||
-           (logged.samples() <= kToldSamples &&
-            means_along(*in_time, p, freeze(logged, p, noise), to));
 }
 
 }  // namespace
@@ -261,7 +249,11 @@ Trace trace(const Problem& logged, const double* p, const FrozenFilter& filter) 
 }
 
 void smoothed_means(const Problem& logged, const double* p, const Noise& noise, double* out) {
-    if (means_alone(logged, p, noise, {out})) return;
+    const InTime in_time(logged, p);
+    if (means_in_pieces(*in_time, p, noise, {out})) return;
+    if (logged.samples() <= kToldSamples &&
+        means_along(*in_time, p, freeze(logged, p, noise), {out}))
+        return;
     const Trace told = trace(logged, p, noise, true);
     std::copy(told.state.begin(), told.state.end(), out);
 }
@@ -271,15 +263,6 @@ void smoothed_means(const Problem& logged, const double* p, const FrozenFilter& 
     const InTime in_time(logged, p);
     if (!filter.tells_of(logged) || !means_along(*in_time, p, filter, {out}))
         smoothed_means(logged, p, filter.noise, out);
-}
-
-bool smoothed_road(const Problem& logged, const double* p, const Noise& noise, double* out) {
-    const std::size_t width = kStatesFull + kRoadStates;
-    std::vector<double> all(logged.samples() * width);
-    if (!means_alone(logged, p, noise, {all.data(), width})) return false;
-    for (std::size_t k = 0; k < logged.samples(); ++k)
-        out = std::copy_n(all.data() + k * width + kStatesFull, kRoadStates, out);
-    return true;
 }
 
 void free_run(const Problem& logged, const double* p, double* readings) {

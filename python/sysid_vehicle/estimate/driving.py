@@ -276,7 +276,9 @@ class Driving:
         core = model.core(force_known=self.force_known)
         longest = pieces.LONGEST if longest is None else longest
         if most_samples is not None:
-            return self._problem(model, core, thinned(self._whole, most_samples), other_inputs)
+            return self._filled(
+                _core.Problem(core), model, thinned(self._whole, most_samples), other_inputs
+            )
         if self.samples <= longest:
             # The car and the effects tell models apart whose parameters are the same.
             made_of = model.vehicle, model.parts
@@ -287,40 +289,36 @@ class Driving:
         channels = self.channels() if channels_in_use() else None
 
         def some(core: _core.SingleTrack, begin: int, end: int) -> _core.Problem:
-            return self._problem(model, core, between(self._whole, begin, end), inputs, channels)
+            parts = between(self._whole, begin, end)
+            return self._filled(_core.Problem(core), model, parts, inputs, channels)
 
         return PiecewiseProblem(some, core, cut(self.spans, longest))
 
     def windows(
-        self, model: Model, windows: Sequence[tuple[int, int]], motion: FloatArray
+        self, model: Model, windows: Sequence[tuple[int, int]], told: FloatArray
     ) -> _core.Problem:
         """The core's problem whose runs are windows, each from a motion that is given.
+
+        Whoever drives answers the slopes to come: where the road has some, windows know them.
 
         Parameters
         ----------
         windows : sequence of (int, int)
             First sample and number of samples; each within one stretch.
-        motion : array, shape (samples, 3 or more)
-            v_x, v_y [m/s], yaw rate [rad/s] with which the windows begin.
+        told : array, shape (samples, states)
+            Smoothed means, as a problem gives them: v_x, v_y [m/s] and yaw rate [rad/s], with which
+            the windows begin, are the first, gravity along and across [m/s2] the last of them.
         """
-        core = model.core(force_known=self.force_known)
+        slope = told[:, -2:]
+        slopes = np.isfinite(slope).all() and slope.any()
+        core, inputs = model.core(force_known=self.force_known), self._whole_inputs
+        if slopes:
+            core, inputs = core.on_known_slopes(), np.hstack([inputs, slope])
         parts = [
             part for first, size in windows for part in between(self._whole, first, first + size)
         ]
         channels = self.channels() if channels_in_use() else None
-        return self._problem(model, core, parts, self._whole_inputs, channels, motion)
-
-    def _problem(
-        self,
-        model: Model,
-        core: _core.SingleTrack,
-        parts: list[Samples],
-        other_inputs: FloatArray | None,
-        channels: FloatArray | None = None,
-        motion: FloatArray | None = None,
-    ) -> _core.Problem:
-        """Runs of the core, each of which begins with a motion where one is given."""
-        return self._filled(_core.Problem(core), model, parts, other_inputs, channels, motion)
+        return self._filled(_core.Problem(core), model, parts, as_float64(inputs), channels, told)
 
     def _filled(
         self,
@@ -331,7 +329,7 @@ class Driving:
         channels: FloatArray | None = None,
         motion: FloatArray | None = None,
     ) -> _core.Problem:
-        """The same problem with its runs."""
+        """The same problem with its runs, each of which begins with a motion where one is given."""
         for log, where, at in parts:
             own = slice(at, at + where.stop - where.start)
             inputs = self._inputs(log, where) if other_inputs is None else other_inputs[own]

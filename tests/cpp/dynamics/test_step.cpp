@@ -56,6 +56,33 @@ TEST(Step, ErrorFallsWithTheFourthPowerAndOfLagsBehindEachOtherWithTheSecond) {
     EXPECT_LT(twice[0], 1e-3 * kSensorNoise[kAy]);
 }
 
+TEST(Step, AKnownSlopePullsAsAnUnknownOneOfItsSize) {
+    const Parameters p = typical_parameters();
+    SingleTrack model{saloon(), lagging_effects()};
+    Input from{0.02, 1000.0}, to{0.05, 3000.0};
+    for (Input* u : {&from, &to}) {
+        u->gravity_x_mps2 = 0.3;
+        u->gravity_y_mps2 = -0.2;
+    }
+    const std::array<double, kExternals> calm{};
+    auto slope = calm;
+    slope[kGravityX] = 0.3;
+    slope[kGravityY] = -0.2;
+    const auto moved = [&](const std::array<double, kExternals>& external) {
+        ModelState<double> x = kStart;
+        advance(model, x, external.data(), from, to, p.data(), 0.1, 4);
+        return x;
+    };
+    const ModelState<double> unknown = moved(slope), level = moved(calm);
+    EXPECT_GT(distance(unknown, level), 0.02);
+    model.slope_known = true;
+    EXPECT_LT(distance(moved(calm), unknown), 1e-13);
+    to.gravity_x_mps2 = 0.5;  // linear in between: twice as much of the difference at its end
+    const double half = moved(calm)[0] - unknown[0];
+    from.gravity_x_mps2 = 0.5;
+    EXPECT_NEAR(moved(calm)[0] - unknown[0], 2.0 * half, 0.01 * half);
+}
+
 TEST(Step, LagsOfAnySizeNeedNoShorterSteps) {
     // Against 40 steps per sample, which 400 would not change: the error stays below a hundredth
     // of what sensors read, and what it would do to the size of the effect below half a percent.

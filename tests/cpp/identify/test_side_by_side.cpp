@@ -97,7 +97,7 @@ TEST_P(SideBySide, PredictionsAreThoseFromOneSampleAfterTheOther) {
                     continue;
                 }
                 ModelState<double> x = initial_state(problem.model, run, p.data());
-                const double* state = known.state.data() + begin * kStatesFull;
+                const double* state = known.state.data() + begin * kStatesTold;
                 std::copy_n(state, kMotionStates, x.begin());
                 for (const std::size_t i : active_states(effects))
                     x[kMotionStates + i] = state[kStatesPlain + i];
@@ -127,7 +127,7 @@ TEST_P(SideBySide, SmoothedMeansAreThoseOfTheWholeSmoother) {
              {ordinary_noise(), sloping_noise(), coloured_noise(), white_noise()}) {
             const Problem problem = long_run(effects);
             const Trace smoothed = trace(problem, p.data(), noise, true);
-            std::vector<double> means(problem.samples() * kStatesFull);
+            std::vector<double> means(problem.samples() * kStatesTold);
             smoothed_means(problem, p.data(), noise, means.data());
             double apart = 0.0;
             for (std::size_t i = 0; i < means.size(); ++i) {

@@ -157,12 +157,26 @@ TEST(Told, TraceIsThatOfTheFilter) {
         }
 }
 
+TEST(Told, ProblemsOfOtherSlopesAreOthers) {
+    const Parameters p = typical_parameters();
+    Problem problem = runs_of(0, 120);
+    problem.model.slope_known = true;
+    const double level = freeze(problem, p.data(), ordinary_noise()).log_likelihood;
+    const MadeOf made(problem, p.data());
+    EXPECT_TRUE(made.is(problem, p.data()));
+    for (Input& u : problem.runs[0].inputs) u.gravity_x_mps2 = 1.0;
+    EXPECT_FALSE(made.is(problem, p.data()));
+    EXPECT_LT(freeze(problem, p.data(), ordinary_noise()).log_likelihood, level - 1.0);
+    problem.model.slope_known = false;
+    EXPECT_NEAR(freeze(problem, p.data(), ordinary_noise()).log_likelihood, level, 1e-9);
+}
+
 TEST(Told, SmoothedMeansOfLateSteeringAreThoseOfTheSmoother) {
     const Parameters p = typical_parameters();
     const Problem problem = runs_of(mask_of({"steer_delay"}), 120);
     ASSERT_NE(p[parameter_of("steer_delay")], 0.0);
     const Trace smoothed = trace(problem, p.data(), ordinary_noise(), true);
-    std::vector<double> means(problem.samples() * kStatesFull);
+    std::vector<double> means(problem.samples() * kStatesTold);
     smoothed_means(problem, p.data(), ordinary_noise(), means.data());
     for (std::size_t i = 0; i < means.size(); ++i)
         if (!std::isnan(means[i])) {

@@ -24,16 +24,16 @@ TEST(Trace, SmoothingGainsCertaintyAndKeepsTheEnd) {
         const Trace filtered = trace(problem, p.data(), ordinary_noise(), false);
         const Trace smoothed = trace(problem, p.data(), ordinary_noise(), true);
         EXPECT_EQ(filtered.log_likelihood, smoothed.log_likelihood);
-        ASSERT_EQ(filtered.state_std.size(), problem.samples() * kStatesFull);
+        ASSERT_EQ(filtered.state_std.size(), problem.samples() * kStatesTold);
         ASSERT_EQ(smoothed.state_std.size(), filtered.state_std.size());
-        const std::size_t last = filtered.state.size() - kStatesFull;
+        const std::size_t last = filtered.state.size() - kStatesTold;
         const ActiveStates own = active_states(effects);
         const auto absent = [&](std::size_t state) {
             return state >= kStatesPlain &&
                    std::find(own.begin(), own.end(), state - kStatesPlain) == own.end();
         };
         for (std::size_t n = 0; n < filtered.state.size(); ++n) {
-            if (absent(n % kStatesFull)) {
+            if (absent(n % kStatesTold)) {
                 EXPECT_TRUE(std::isnan(filtered.state[n]));
                 EXPECT_TRUE(std::isnan(smoothed.state_std[n]));
                 continue;
@@ -44,8 +44,8 @@ TEST(Trace, SmoothingGainsCertaintyAndKeepsTheEnd) {
             }
         }
         // In the middle of the record the sideslip is known much better afterwards.
-        EXPECT_LT(smoothed.state_std[100 * kStatesFull + 1],
-                  0.95 * filtered.state_std[100 * kStatesFull + 1]);
+        EXPECT_LT(smoothed.state_std[100 * kStatesTold + 1],
+                  0.95 * filtered.state_std[100 * kStatesTold + 1]);
     }
 }
 
@@ -153,6 +153,24 @@ TEST(LookAhead, ErrorsKnowTheSlopesToComeAndReadingsDoNot) {
             EXPECT_GT(without, 3.0 * count) << c << " of " << samples;
         }
     }
+}
+
+TEST(Trace, TellsTheSlopeOfTheRoad) {
+    const Parameters p = typical_parameters();
+    Problem problem{SingleTrack{saloon(), mask_of({"road_bank", "road_grade"})}, {}};
+    problem.runs = {noisy_run(problem.model, p, 600, 0.01, 11)};
+    problem.model = SingleTrack{saloon(), 0};
+    const Trace told = trace(problem, p.data(), sloping_noise(), true);
+    const Trace level = trace(problem, p.data(), ordinary_noise(), true);
+    const std::array<double, 2> angles{p[parameter_of("road_grade")], p[parameter_of("road_bank")]};
+    for (std::size_t k = 100; k < 500; ++k)
+        for (std::size_t i = 0; i < kRoadStates; ++i) {
+            const std::size_t n = k * kStatesTold + kStatesFull + i;
+            const double size = kGravity * std::sin(std::abs(angles[i]));
+            EXPECT_GT(told.state_std[n], 0.0);
+            EXPECT_NEAR(std::abs(told.state[n]), size, 4.0 * told.state_std[n]) << k << " " << i;
+            EXPECT_TRUE(std::isnan(level.state[n]));
+        }
 }
 
 TEST(LookAhead, SlopesAreThoseOfSteeringAsItActs) {

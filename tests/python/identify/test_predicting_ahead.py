@@ -13,9 +13,11 @@ from sysid_vehicle import (
     InvalidInput,
     Log,
     Model,
+    RoadDisturbance,
     Vehicle,
     diagnose,
     drive,
+    example_vehicle,
     identify,
     manoeuvres,
     read_log,
@@ -73,6 +75,23 @@ def test_standard_errors_are_those_of_repeated_drives(complete_fits: tuple[Fit, 
         # Chi-square with three degrees of freedom: between the quantiles of 0.1 and 99.9 %.
         share = 3.0 * scatter**2 / np.mean([f[name].std ** 2 for f in fits])
         assert 0.02 < share < 16.3
+
+
+def test_a_driver_who_answers_slopes_hides_no_force() -> None:
+    """The force is there with each slope: the car seemed 28 % heavier, and is 20."""
+    hilly_road = manoeuvres.Manoeuvre(
+        *("road", "slopes and bends", 100.0),
+        *(lambda t: 20.0 + 4.0 * np.sin(0.1 * t), lambda t: 4.0 * np.sin(0.35 * t) ** 3),
+        tracks_path=True,
+    )
+    name, slopes = "mass.relative_error", RoadDisturbance(slope_rad=0.026)
+    car = Model(example_vehicle()).add("mass").with_values({name: 0.2})
+    log = drive(car, hilly_road, seed=4, rate_hz=50.0, disturbance=slopes)
+    one_step = identify(car, log, starts=1)
+    found = predicting_ahead(one_step, 5.0)[name]
+    assert found.value == pytest.approx(0.2, abs=min(0.03, 3.0 * found.std))
+    # What slopes are smoothed with is known no better than that.
+    assert one_step[name].std < found.std < 2.0 * one_step[name].std
 
 
 def test_a_car_of_another_simulator_is_predicted_better(shared_data: Path, repo: Path) -> None:

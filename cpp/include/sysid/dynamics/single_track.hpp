@@ -27,6 +27,7 @@ struct InputOf {
     V steer_rate_radps{};  // where a model asks for it
     std::array<V, kUserChannels> channels{};  // that users' effects read
     Axles<V> loads_n{};                       // that the tyres feel, of a model with `loads_known`
+    V gravity_x_mps2{}, gravity_y_mps2{};     // along and across, of one with `slope_known`
 };
 using Input = InputOf<double>;
 template <class S>
@@ -70,6 +71,7 @@ struct SingleTrackOf {
     UserEffects user = nullptr;  // those that act; `effects` has no bits of theirs
     bool loads_known = false;    // tyres feel the loads of the input in place of (5)
     bool inputs_held = false;    // from sample to sample, as a digital controller does
+    bool slope_known = false;    // the slope of the road is that of the input
     Axles<double> most_n{};      // largest of these loads, where they are known
 
     /// Whether loads move by (6); with no height of the centre of gravity they are held as well.
@@ -180,7 +182,7 @@ struct SingleTrackOf {
         part("steering");
         each([&](auto e, const T* own, At at) { return e.steering(own, w, lags.from(at)); });
         part("forces from outside");
-        settle_outside_forces<T>(w, external);
+        settle_outside_forces<T>(w, external, u);
         each([&](auto e, const T* own, At) { return e.body(own, w); });
         user_body(user, q, w);
         part("slip angles");
@@ -254,12 +256,15 @@ struct SingleTrackOf {
     }
 
     template <class T, class S>
-    static void settle_outside_forces(Workings<S>& w, const S* external) {
+    void settle_outside_forces(Workings<S>& w, const S* external, const InputFor<S>& u) const {
         w.force_x = external[kForceX] - drag_force(w.rho, plain<T>(w.drag_area), w.v_x);
         w.force_y = external[kForceY];
         w.moment_z = external[kMomentZ];
         w.gravity_x = external[kGravityX];
         w.gravity_y = external[kGravityY];
+        if (!slope_known) return;
+        w.gravity_x += S(u.gravity_x_mps2);
+        w.gravity_y += S(u.gravity_y_mps2);
     }
 
     // The front load depends on a_x, which depends on the front lateral force, which is

@@ -33,6 +33,8 @@ InputOf<V> between(const InputOf<V>& a, const InputOf<V>& b, double part) {
     for (std::size_t i = 0; i < kUserChannels; ++i)
         mixed.channels[i] = mix(a.channels[i], b.channels[i]);
     mixed.loads_n = {mix(a.loads_n.front, b.loads_n.front), mix(a.loads_n.rear, b.loads_n.rear)};
+    mixed.gravity_x_mps2 = mix(a.gravity_x_mps2, b.gravity_x_mps2);
+    mixed.gravity_y_mps2 = mix(a.gravity_y_mps2, b.gravity_y_mps2);
     return mixed;
 }
 

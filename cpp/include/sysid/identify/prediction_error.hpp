@@ -133,7 +133,7 @@ struct Trace {
     std::vector<double> spread;       // its expected standard deviation
     std::vector<double> whitened;     // zero where missing
     std::vector<double> log_density;  // -1/2 log det S, per sample
-    std::vector<double> state;        // samples x kStatesFull, filtered or smoothed
+    std::vector<double> state;        // samples x kStatesTold, filtered or smoothed
     std::vector<double> state_std;
     double log_likelihood = 0.0;
 };
@@ -143,17 +143,13 @@ Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smo
 /// What the filter says, where it has run with these parameters, under its noise.
 Trace trace(const Problem& logged, const double* p, const FrozenFilter& filter);
 
-/// The states that the smoother tells, samples x kStatesFull, without how sure they are: a third of
+/// The states that the smoother tells, samples x kStatesTold, without how sure they are: a third of
 /// the work.
 void smoothed_means(const Problem& logged, const double* p, const Noise& noise, double* out);
 
 /// The same where the filter has run with these parameters, under its noise.
 void smoothed_means(const Problem& logged, const double* p, const FrozenFilter& filter,
                     double* out);
-
-/// Gravity along and across as the smoother tells it, samples x kRoadStates, of a road of varying
-/// slope; false where the smoother fails.
-bool smoothed_road(const Problem& logged, const double* p, const Noise& noise, double* out);
 
 /// Predictions so many samples ahead, of which one sample in `every` starts one.
 struct Horizon {

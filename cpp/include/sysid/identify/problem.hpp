@@ -85,6 +85,8 @@ static_assert(kMotionStates + kRoadStates == kPushes && kPushes + kColourStates 
 /// own.
 constexpr int kStatesPlain = 2 * kMotionStates;
 constexpr int kStatesFull = kStatesPlain + kAuxiliaryStates;
+/// What is told of a sample: these, then gravity along and across.
+constexpr int kStatesTold = kStatesFull + kRoadStates;
 
 struct Problem {
     SingleTrack model;
@@ -130,6 +132,8 @@ ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p
     const Input& u = run.inputs[begin];
     InputFor<S> input{u.steer_rad, u.longitudinal, u.time_s, u.steer_rate_radps};
     std::copy(u.channels.begin(), u.channels.end(), input.channels.begin());
+    input.gravity_x_mps2 = u.gravity_x_mps2;
+    input.gravity_y_mps2 = u.gravity_y_mps2;
     settle_auxiliary(model, x, calm.data(), input, p);
     return x;
 }

@@ -90,7 +90,7 @@ class RecordedModel {
         }
     }
 
-    static constexpr std::size_t kGiven = 6 + kUserChannels;  // numbers of an `Input`
+    static constexpr std::size_t kGiven = 8 + kUserChannels;  // numbers of an `Input`
 
   private:
     struct Moving {

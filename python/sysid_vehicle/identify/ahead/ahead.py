@@ -46,13 +46,14 @@ _STILL = 1e-6  # noise of a motion that is certain
 def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     """Fit the free parameters to predictions over windows, from a fit of the likelihood.
 
-    Each window begins with the smoothed motion, and from there on knows steering and wheel force
-    alone. Errors count in standard deviations of their channel over the driving, together with ten
-    times the noise of its sensor: beside an accelerometer that shakes other channels decide.
-    Windows in which the model loses the car do not count, a tenth at most. The search begins from
-    the likelihood's parameters, and once more with the tyres of the vehicle file. Standard errors
-    are those of windows that are wrong alike for ten seconds (sandwich of Huber and White over such
-    blocks).
+    Each window begins with the smoothed motion, and from there on knows steering, wheel force, and
+    the smoothed slope of a road that is not level: drivers answer slopes, and of models that do
+    not know them one that answers less would err less. Errors count in standard deviations of
+    their channel over the driving, together with ten times the noise of its sensor: beside an
+    accelerometer that shakes other channels decide. Windows in which the model loses the car do
+    not count, a tenth at most. The search begins from the likelihood's parameters, and once more
+    with the tyres of the vehicle file. Standard errors are those of windows that are wrong alike
+    for ten seconds (sandwich of Huber and White over such blocks).
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         information,
         box,
         [model.bounds(n) for n in names],
-        pushed=pushed,
+        pushed=np.hstack([pushed, ahead.of_slopes()]),
     )
     return replace(
         fit,
@@ -192,13 +193,13 @@ class _Ahead:
         `look` is `looked` of the start, where it is known.
         """
         driving, model, windows = self.fit.driving, self.fit.model, self.windows
-        squares, motion = self.looked(p) if look is None else look
+        squares, told = self.looked(p) if look is None else look
         turning = squares[self.turns]
         typical = float(np.median(turning))
         most = max(_LOST**2 * typical, float(np.quantile(turning, _KEPT)))
         kept = [w for w, square in zip(windows, squares, strict=True) if square <= most]
         counted = sorted(kept, key=lambda window: window[::-1])
-        errors = counting(driving, model, counted, motion, typical)
+        errors = counting(driving, model, counted, told, typical)
         gains = errors.freeze(p, self.noise)
         found = minimise(
             Penalised(errors, self.prior),
@@ -220,15 +221,24 @@ class _Ahead:
 
         def slope(of: Driving) -> FloatArray:
             """Downhill; priors are the same whatever was read."""
-            motion = as_float64(
-                of.problem(self.fit.model).smoothed_means(end.p, self.fit.noise.vector())
-            )
-            problems = counting(of, self.fit.model, end.counted, motion, 1.0).problems
+            told = self._told(of.problem(self.fit.model), end.p)
+            problems = counting(of, self.fit.model, end.counted, told, 1.0).problems
             errors = replace(end.errors, problems=problems)
             return errors.normal_equations(end.p, end.gains, self.box.columns)[1]
 
         pushes = pushes_of_time(self.fit.driving, slope)
         return as_float64(np.linalg.pinv(curvature, hermitian=True) @ pushes)
+
+    def of_slopes(self) -> FloatArray:
+        """Principal directions, one standard error long, of what slopes were smoothed with.
+
+        Slopes take up what a wrong mass or force leaves: windows that know them begin with the
+        likelihood's parameters, and tell these no better. Shape (n, n); (n, 0) on a level road.
+        """
+        if not self.fit.noise.sloping:
+            return np.empty((len(self.box.columns), 0))
+        values, vectors = np.linalg.eigh(self.fit.covariance)
+        return as_float64(vectors * np.sqrt(np.maximum(values, 0.0)))
 
     def trimmed(self, look: _Look) -> float:
         """Mean square of the windows in which the car turns, without those that err most."""
@@ -236,11 +246,14 @@ class _Ahead:
         return float(np.mean(squares[: max(int(_KEPT * len(squares)), 1)]))
 
     def looked(self, p: FloatArray) -> _Look:
-        """Mean square of each window, and the motion that they begin with."""
+        """Mean square of each window, and what the smoother tells at these parameters."""
+        told = self._told(self.whole, p)
+        every = self.fit.driving.windows(self.fit.model, self.windows, told)
+        return squares_of(every.residuals(p, every.freeze(p, self.noise)), self.windows), told
+
+    def _told(self, problem: DrivingProblem, p: FloatArray) -> FloatArray:
         # What is not measured is smoothed with the parameters that are being sought.
-        motion = as_float64(self.whole.smoothed_means(p, self.fit.noise.vector()))
-        every = self.fit.driving.windows(self.fit.model, self.windows, motion)
-        return squares_of(every.residuals(p, every.freeze(p, self.noise)), self.windows), motion
+        return as_float64(problem.smoothed_means(p, self.fit.noise.vector()))
 
 
 def _starts(model: Model, box: Box) -> list[FloatArray]:

@@ -100,13 +100,13 @@ def counting(
     driving: Driving,
     model: Model,
     windows: list[tuple[int, int]],
-    motion: FloatArray,
+    told: FloatArray,
     square: float,
 ) -> Windows:
     """Windows, sorted by their length, of which the typical mean square is known."""
     alike = [(length, list(few)) for length, few in groupby(windows, key=itemgetter(1))]
     return Windows(
-        tuple(driving.windows(model, few, motion) for _, few in alike),
+        tuple(driving.windows(model, few, told) for _, few in alike),
         tuple(float(np.sqrt(max(square * length, _TINY))) for length, _ in alike),
     )
 
