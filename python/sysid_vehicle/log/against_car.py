@@ -144,6 +144,26 @@ def _check_numbers(log: Log, drive: Drive, mass_kg: float, wheelbase_m: float) -
             f"{log.name}: mass_kg = {mass_kg:g}, but fx_n moves the car as if it had "
             f"{mass_kg / mass.ratio:.4g} kg, {mass.place}; {likely}"
         )
+    _check_steer(log, drive, wheelbase_m)
+
+
+def check_steering_of(log: Log, wheelbase_m: float) -> None:
+    """Refuse, or warn of, a steering angle that is not that of road wheels of this car.
+
+    What `check_car` says of the steering, for those whom the force does not matter.
+
+    Raises
+    ------
+    InvalidInput
+        The message names what the log tells, and the likely remedy.
+    """
+    columns = {name: log[name] for name in log.channels if name not in log.extras}
+    drive = _driven(_motion(columns, log.rate_hz), wheelbase_m)
+    if drive is not None:
+        _check_steer(log, drive, wheelbase_m)
+
+
+def _check_steer(log: Log, drive: Drive, wheelbase_m: float) -> None:
     steer = _steer(drive, wheelbase_m)
     if steer is None:
         _refuse_far_longer(log, drive, wheelbase_m)

@@ -21,7 +21,7 @@ from .._common.text import number
 from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
-from ..log import Log
+from ..log import Log, check_steering_of
 from ..vehicle import Vehicle, slip_angles
 from .cornering_forces import (
     along_the_car,
@@ -31,6 +31,8 @@ from .cornering_forces import (
     parabolas,
     pulled_sideways,
     straightness,
+    times_road_wheels,
+    warn_of_steering,
 )
 from .sideslip import static_stiffness, yaw_inertia
 from .sideslip_settings import NOISE_BLOCK
@@ -239,19 +241,22 @@ def cornering_stiffness(
     Raises
     ------
     InvalidInput
-        If neither `beta_rad` nor ``vy_mps`` is there, a value cannot be, or the log is shorter
-        than the window.
+        If neither `beta_rad` nor ``vy_mps`` is there, a value cannot be, the log is shorter than
+        the window, or the steering angle is not that of a car of this wheelbase, as that of the
+        steering wheel is not.
 
     Warns
     -----
     SysidWarning
-        If too few samples hold slip, or the result is negative.
+        If too few samples hold slip, the result is negative, or the steering angle is surely not
+        that of the road wheels.
     """
     beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if beta_rad is None else as_float64(beta_rad)
     if beta.shape != (log.n,):
         raise InvalidInput(f"beta_rad: shape {beta.shape}; give one value for each of {log.n}")
     if window_s is not None and not (np.isfinite(window_s) and window_s > 0.0):
         raise InvalidInput(f"window_s: {window_s:g} is not above 0; leave it out to have it chosen")
+    check_steering_of(log, vehicle.wheelbase_m)
     rate, vx = log["yaw_rate_radps"], log["vx_mps"]
     vx = np.where(vx > _SLOWEST_MPS, vx, np.nan)
     slips = slip_angles(vehicle.lf_m, vehicle.lr_m, log["steer_rad"], 1.0, np.tan(beta), rate / vx)
@@ -275,8 +280,10 @@ def cornering_stiffness(
             f"{log.name}: {log.n} samples are fewer than the window of {width}; give a longer log, "
             f"or a shorter window_s"
         )
-    motion = (vx, vx * np.tan(beta), rate, log["ay_mps2"])
-    felt_more = felt_beside([parabolas(y, width) for y in motion], log.rate_hz)
+    motion = (vx, vx * np.tan(beta), rate, log["ay_mps2"], log["steer_rad"])
+    moved = [parabolas(y, width) for y in motion]
+    warn_of_steering(log, times_road_wheels(vehicle, moved, log.rate_hz, width))
+    felt_more = felt_beside(moved[:4], log.rate_hz)
     readings, smooth = _readings(vehicle, log, slips, width, of_roll(felt_more))
     found = CorneringRls(vehicle, forgetting=forgetting, **settings).run(readings).T
     cf, cr, cf_std, cr_std, used = found

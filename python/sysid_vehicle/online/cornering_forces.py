@@ -12,11 +12,18 @@ import numpy as np
 import scipy
 
 from .._common.arrays import FloatArray, as_float64
+from ..errors import warn
 from ..log import Log
+from ..log.laws.regression import SURE, regress
 from ..tyre import Tyre, magic_formula
 from ..vehicle import Vehicle
 
 _STIFFNESSES = np.geomspace(1.5, 80.0, 33)  # over load [1/rad]: what tyres have
+# Lateral accelerations at which a steering angle is compared with the path, and the least of it; of
+# logs with more than that share beyond the hard one the ratio is up to 1.5 in right ones.
+_GENTLE_MPS2, _EXCITED_MPS2, _HARD_MPS2, _HARD_SHARE = 4.0, 0.5, 5.0, 0.002
+_WRONG_STEER = 1.2  # a v_y that is measured half a metre elsewhere does as much
+_FEWEST_ROWS = 60
 _LEAST_RATIO = 0.5  # of secant and slope; beyond no stiffness is told
 _LEAST_LOAD = 0.2  # of the static load
 _MOST_ROLL = 0.1  # of gravity that an accelerometer feels as the body rolls, per lateral one
@@ -84,6 +91,59 @@ def felt_beside(smooth: Sequence[FloatArray], rate_hz: float) -> float:
 def of_roll(felt: float) -> float:
     """What of that is taken for roll of the body; more is a road that leans, or a wrong scale."""
     return min(max(felt, 0.0), _MOST_ROLL)
+
+
+def times_road_wheels(
+    vehicle: Vehicle, smooth: Sequence[FloatArray], rate_hz: float, width: int
+) -> tuple[float, float] | None:
+    """Steering angle over that of the road wheels, and its standard deviation; None if not told.
+
+    The path of the front axle has the angle ``(v_y + l_f r) / v_x``; the wheels are turned by so
+    much, and by the slip that the side force asks for, in a curve of any tyre. The angle of the
+    path, which is noisy, is the side that stays.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    smooth : sequence of 5 ndarray, shape (n,)
+        v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2], steering angle [rad], smoothed alike.
+    rate_hz : float
+    width : int
+        Samples of the window of smoothing: nearer ones hold the same noise.
+    """
+    v_x, v_y, rate, a_y, steer = smooth
+    path = (v_y + vehicle.lf_m * rate) / v_x
+    turning = vehicle.usual_inertia_kgm2 / vehicle.mass_kg * np.gradient(rate, 1.0 / rate_hz)
+    force = (vehicle.lr_m * a_y + turning) / vehicle.wheelbase_m
+    columns = np.column_stack([steer, force, force**3, np.ones(force.size)])
+    known = np.isfinite(path) & np.isfinite(columns).all(axis=1) & (np.abs(a_y) < _GENTLE_MPS2)
+    driven = np.isfinite(path) & np.isfinite(a_y)
+    if np.count_nonzero(driven & (np.abs(a_y) > _HARD_MPS2)) > _HARD_SHARE * driven.sum():
+        return None  # bodies that roll and tyres that slide turn the car otherwise
+    rows = np.flatnonzero(known)[:: max(width // 2, 1)]
+    if rows.size < _FEWEST_ROWS or float(np.std(a_y[rows])) < _EXCITED_MPS2:
+        return None
+    none, free = np.zeros(4), np.full(4, np.inf)
+    found = regress(path[rows], columns[rows], none, free)
+    share, deviation = float(found.coefficients[0]), float(found.deviations[0])
+    if share <= SURE * deviation:
+        return None
+    return 1.0 / share, deviation / share**2
+
+
+def warn_of_steering(log: Log, times: tuple[float, float] | None) -> None:
+    """Say that the steering angle is surely not that of the road wheels."""
+    if times is None:
+        return
+    ratio, deviation = times
+    if abs(np.log(ratio)) > np.log(_WRONG_STEER) + SURE * deviation / ratio:
+        warn(
+            f"{log.name}: steer_rad is {ratio:.3g} +- {2.0 * deviation:.1g} times that of road "
+            f"wheels by vy_mps and yaw_rate_radps, over the whole log, and the front stiffness is "
+            f"wrong with it: a commanded angle or that of the steering wheel needs another ratio, "
+            f"factor = {1.0 / ratio:.3g} times the present one in the channel map; else check lf_m "
+            f"and where vy_mps is measured"
+        )
 
 
 def straightness(

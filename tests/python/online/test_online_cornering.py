@@ -1,6 +1,8 @@
 """Cornering stiffness by least squares: no bias by what it leaves out."""
 
 import dataclasses
+import re
+import warnings
 
 import numpy as np
 import pytest
@@ -88,3 +90,32 @@ def test_secant_over_slope_is_that_of_the_tyre_which_has_the_secant() -> None:
     np.testing.assert_allclose(secant[-1] / ratio[-1], slope, rtol=0.002)
     assert (straightness(other, load, slip, np.zeros(500), np.full(500, 1e4)) == 1.0).all()
     assert np.isfinite(straightness(other, load, slip, used, np.full(500, -1e4))).all()
+
+
+@pytest.mark.parametrize("lateral", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("times", [0.7, 1.4])
+def test_a_steering_angle_that_is_not_of_the_road_wheels_is_told(
+    lateral: float, times: float
+) -> None:
+    vehicle = sv.example_vehicle()
+    log = sv.drive(sv.Model(vehicle), sv.manoeuvres.lap(60.0, lateral, 16.0), seed=7)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cornering_stiffness(vehicle, log)
+    columns = {name: log[name] for name in log.channels}
+    columns["steer_rad"] = times * columns["steer_rad"]
+    other = sv.Log.from_arrays(columns, name="run", check=False)
+    with pytest.warns(sv.SysidWarning) as heard:
+        cornering_stiffness(vehicle, other)
+    told = (re.search(r"run: steer_rad is ([\d.]+) .* that of road", str(w.message)) for w in heard)
+    (found,) = (float(match[1]) for match in told if match is not None)
+    assert found == pytest.approx(times, rel=0.02)
+
+
+def test_the_angle_of_the_steering_wheel_is_refused() -> None:
+    vehicle = sv.example_vehicle()
+    log = sv.drive(sv.Model(vehicle), sv.manoeuvres.lap(60.0, 8.5, 34.0), seed=8)
+    columns = {name: log[name] for name in log.channels}
+    columns["steer_rad"] = 16.0 * columns["steer_rad"]
+    with pytest.raises(sv.InvalidInput, match=r"steer_rad is 1\d\.?\d* times .* steering ratio"):
+        cornering_stiffness(vehicle, sv.Log.from_arrays(columns, name="run", check=False))
