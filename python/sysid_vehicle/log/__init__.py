@@ -1,6 +1,6 @@
 """Driving logs: canonical channels on a uniform grid, checked before they are used."""
 
-from .against_car import check_car, times_wheelbase
+from .against_car import check_car, check_steering_of, times_wheelbase
 from .build import LEAST_STRETCH_S, LEAST_USABLE_S
 from .channels import CHANNELS, COMMANDS, MEASURED, Channel
 from .columns import Columns, as_floats, listed, named_columns
@@ -28,6 +28,7 @@ __all__ = [
     "as_seconds",
     "check_car",
     "check_excitation",
+    "check_steering_of",
     "copies",
     "counted_on",
     "held_rows",

@@ -20,12 +20,15 @@ from .laws.longitudinal import DRAG_PER_M, ramp_on
 from .laws.motion import Motion
 from .laws.regression import size_of
 from .laws.steered_axle import steered_behind
+from .laws.wheelbase import longest_wheelbase
 from .log import Log
 
 _MOVING = 5.0  # m/s, with a wheelbase of `_USUAL_M`: slip and curvature are alike at like v^2 / L
 _USUAL_M = 2.6
 _LEAST_M = 0.1  # the shortest wheelbase
 _MAGNITUDE = 4.0
+_FAR_LONGER = 1.5  # times the longest wheelbase that the log allows for
+_OTHER_CAR = "the vehicle file is that of another car, or in other units; give the one of this car"
 _MIN_WINDOWS = 12
 _FEWEST = 4  # windows in which the car brakes
 _SETTLING = 1  # windows before and after harder driving
@@ -114,18 +117,17 @@ def _check_magnitudes(log: Log, slow: Drive, mass_kg: float, wheelbase_m: float)
     nothing.
     """
     mass = _mass(slow, mass_kg) if log.has("fx_n") else None
-    other = "the vehicle file is that of another car, or in other units; give the one of this car"
     if mass is not None and mass.off(_MAGNITUDE, _FORCE_STD):
         raise InvalidInput(
             f"{log.name}: mass_kg = {mass_kg:g}, but fx_n moves the car as if it had "
-            f"{mass_kg / mass.ratio:.4g} kg, {mass.place}; {other}"
+            f"{mass_kg / mass.ratio:.4g} kg, {mass.place}; {_OTHER_CAR}"
         )
     steer = _steer(slow, wheelbase_m)
     if steer is not None and steer.off(_MAGNITUDE, _STEER_STD):
         raise InvalidInput(
             f"{log.name}: it turns as a car with a wheelbase of about "
             f"{steer.ratio * wheelbase_m:.2g} m does, {steer.place}, and lf_m + lr_m are "
-            f"{wheelbase_m:g} m; {other}, or mend the unit of steer_rad"
+            f"{wheelbase_m:g} m; {_OTHER_CAR}, or mend the unit of steer_rad"
         )
 
 
@@ -142,7 +144,29 @@ def _check_numbers(log: Log, drive: Drive, mass_kg: float, wheelbase_m: float) -
             f"{log.name}: mass_kg = {mass_kg:g}, but fx_n moves the car as if it had "
             f"{mass_kg / mass.ratio:.4g} kg, {mass.place}; {likely}"
         )
+    _check_steer(log, drive, wheelbase_m)
+
+
+def check_steering_of(log: Log, wheelbase_m: float) -> None:
+    """Refuse, or warn of, a steering angle that is not that of road wheels of this car.
+
+    What `check_car` says of the steering, for those whom the force does not matter.
+
+    Raises
+    ------
+    InvalidInput
+        The message names what the log tells, and the likely remedy.
+    """
+    columns = {name: log[name] for name in log.channels if name not in log.extras}
+    drive = _driven(_motion(columns, log.rate_hz), wheelbase_m)
+    if drive is not None:
+        _check_steer(log, drive, wheelbase_m)
+
+
+def _check_steer(log: Log, drive: Drive, wheelbase_m: float) -> None:
     steer = _steer(drive, wheelbase_m)
+    if steer is None:
+        _refuse_far_longer(log, drive, wheelbase_m)
     if steer is not None and steer.off(1.0, _STEER_STD):
         likely = _likely(steer, _LENGTH_SLIPS) or (
             f"if it was made from the angle of the steering wheel, the steering ratio is about "
@@ -158,6 +182,17 @@ def _check_numbers(log: Log, drive: Drive, mass_kg: float, wheelbase_m: float) -
         if abs(math.log(steer.ratio)) > math.log(_STEER_NEVER):
             raise InvalidInput(said)
         warn(said)
+
+
+def _refuse_far_longer(log: Log, drive: Drive, wheelbase_m: float) -> None:
+    """Refuse the file of a far longer car, where too little driving is gentle to tell a ratio."""
+    told = longest_wheelbase(drive, _UNDERSTEER_MOST)
+    if told is not None and told[0] * _FAR_LONGER < wheelbase_m:
+        raise InvalidInput(
+            f"{log.name}: it turns as a car with a wheelbase of {told[0]:.2g} m at most does, "
+            f"{told[1]}, and lf_m + lr_m are {wheelbase_m:g} m; {_OTHER_CAR}, or mend the unit of "
+            f"steer_rad"
+        )
 
 
 def times_wheelbase(

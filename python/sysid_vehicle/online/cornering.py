@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from .. import _core
 from .._common.arrays import FloatArray, as_float64
@@ -22,9 +21,19 @@ from .._common.text import number
 from .._common.typed import typed
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
-from ..log import Log
-from ..tyre import Tyre
+from ..log import Log, check_steering_of
 from ..vehicle import Vehicle, slip_angles
+from .cornering_forces import (
+    along_the_car,
+    felt_beside,
+    load_shares,
+    of_roll,
+    parabolas,
+    pulled_sideways,
+    straightness,
+    times_road_wheels,
+    warn_of_steering,
+)
 from .sideslip import static_stiffness, yaw_inertia
 from .sideslip_settings import NOISE_BLOCK
 
@@ -150,10 +159,9 @@ class CorneringRun(Told):
     Attributes
     ----------
     time_s, cf_npr, cr_npr, cf_std_npr, cr_std_npr : ndarray
-        Time, stiffness of the axles [N/rad] and their standard deviations. The stiffness is the
-        secant of the tyre curve at the slips that were used; the standard deviation covers that of
-        the regression, with the noise of the slip angles, what the tyres of the vehicle file bend
-        away by up to there, and what was put back of what noise in the slip angles takes from it.
+        Time, stiffness of the axles at no slip and the load at rest [N/rad], and their standard
+        deviations. These cover that of the regression, with the noise of the slip angles, and all
+        that was put back of what bent tyres and noise in the slip angles take from the stiffness.
     used : ndarray of bool
         Whether the sample held enough slip, and not too much.
     """
@@ -203,12 +211,13 @@ def cornering_stiffness(
 ) -> CorneringRun:
     """Cornering stiffness over a log, by recursive least squares.
 
-    It knows neither tyres that answer late nor load that braking moves between the axles: of a slow
-    vehicle with a long relaxation length (a bus at 8 to 20 m/s, 0.6 m) the front stiffness came
-    out 19 % low, beyond its standard deviation. Of five simulated cars (0.35 to 0.7 m, 16 to 28
-    m/s, up to 3 m/s2, a vehicle file with generic tyres) it was 2 to 9 % low, in 4 of 10 axles
-    beyond two standard deviations: the tyres are late, and bend more than those of the
-    file. `estimate_sideslip` knows both.
+    Told is the stiffness at no slip and the load at rest. What the tyres bend away at the slips
+    used, by shape and friction of the vehicle file, is put back, as is what noise in the slip
+    angles takes. Load that the acceleration moves, side force of driven and braked front wheels,
+    and up to a tenth more of `ay_mps2` than the motion has, which a rolling body makes, are
+    allowed for; the standard deviations hold all of the first and the last, as friction may be
+    another one, and as a road may lean. Not known are tyres that answer late, and what lateral
+    load transfer takes: of cars with both it is up to 5 % low in front (`benchmarks/online`).
 
     Parameters
     ----------
@@ -232,19 +241,22 @@ def cornering_stiffness(
     Raises
     ------
     InvalidInput
-        If neither `beta_rad` nor ``vy_mps`` is there, a value cannot be, or the log is shorter
-        than the window.
+        If neither `beta_rad` nor ``vy_mps`` is there, a value cannot be, the log is shorter than
+        the window, or the steering angle is not that of a car of this wheelbase, as that of the
+        steering wheel is not.
 
     Warns
     -----
     SysidWarning
-        If too few samples hold slip, or the result is negative.
+        If too few samples hold slip, the result is negative, or the steering angle is surely not
+        that of the road wheels.
     """
     beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if beta_rad is None else as_float64(beta_rad)
     if beta.shape != (log.n,):
         raise InvalidInput(f"beta_rad: shape {beta.shape}; give one value for each of {log.n}")
     if window_s is not None and not (np.isfinite(window_s) and window_s > 0.0):
         raise InvalidInput(f"window_s: {window_s:g} is not above 0; leave it out to have it chosen")
+    check_steering_of(log, vehicle.wheelbase_m)
     rate, vx = log["yaw_rate_radps"], log["vx_mps"]
     vx = np.where(vx > _SLOWEST_MPS, vx, np.nan)
     slips = slip_angles(vehicle.lf_m, vehicle.lr_m, log["steer_rad"], 1.0, np.tan(beta), rate / vx)
@@ -268,27 +280,24 @@ def cornering_stiffness(
             f"{log.name}: {log.n} samples are fewer than the window of {width}; give a longer log, "
             f"or a shorter window_s"
         )
-    step = 1.0 / log.rate_hz
-    smooth = [_parabolas(y, width) for y in (*slips, log["ay_mps2"], rate)]
-    # The slope of a local parabola fades sooner with frequency than its value does: next to values
-    # it would be too small, and the stiffness with it.
-    smooth[3] = np.gradient(smooth[3], step)
-    readings = np.column_stack(smooth)
+    motion = (vx, vx * np.tan(beta), rate, log["ay_mps2"], log["steer_rad"])
+    moved = [parabolas(y, width) for y in motion]
+    warn_of_steering(log, times_road_wheels(vehicle, moved, log.rate_hz, width))
+    felt_more = felt_beside(moved[:4], log.rate_hz)
+    readings, smooth = _readings(vehicle, log, slips, width, of_roll(felt_more))
     found = CorneringRls(vehicle, forgetting=forgetting, **settings).run(readings).T
     cf, cr, cf_std, cr_std, used = found
     # Noise of the slips, which both axles share, times the stiffness is one of the readings.
     felt = (cf * noises[0] + cr * noises[1]) / vehicle.mass_kg
     louder = np.hypot(1.0, _root_mean(felt, used) / ay_std)
     both = []
-    for tyre, slip, noise, c, std in (
-        (vehicle.tyre_front, readings[:, 0], noises[0], cf, cf_std),
-        (vehicle.tyre_rear, readings[:, 1], noises[1], cr, cr_std),
-    ):
-        faded = _faded(slip, _KEPT / width * noise**2, used)
-        whole = c / (1.0 - faded)
-        both.append(
-            (whole, np.hypot(std * louder, whole * np.hypot(_bent(tyre, slip, used), faded)))
-        )
+    for i, (c, std) in enumerate(((cf, cf_std), (cr, cr_std))):
+        tyre, load = (vehicle.tyre_front, vehicle.tyre_rear)[i], vehicle.static_loads_n[i]
+        faded = _faded(smooth[i], _KEPT / width * noises[i] ** 2, used)
+        straight = straightness(tyre, load, smooth[i], used, c)
+        whole = c / ((1.0 - faded) * straight)
+        put_back = np.hypot(np.hypot(1.0 - straight, faded), min(abs(felt_more), _MOST_FADED))
+        both.append((whole, np.hypot(std * louder / straight, whole * put_back)))
     (cf, cf_std), (cr, cr_std) = both
     run = CorneringRun(log.name, log["time_s"], cf, cr, cf_std, cr_std, used > 0.5)
     if not run.excited:
@@ -306,6 +315,32 @@ def cornering_stiffness(
                 f"angles are noise"
             )
     return run
+
+
+def _readings(
+    vehicle: Vehicle, log: Log, slips: Sequence[FloatArray], width: int, roll: float
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Arguments of :meth:`CorneringRls.run`, and the slip angles of both axles, smoothed alike.
+
+    Slip angles count by the load of their axle, and for the front one by what of its side force
+    acts across the car. Readings are without the side force of drive and brake, and without the
+    share `roll` of gravity.
+    """
+    channels = (*slips, log["ay_mps2"], log["yaw_rate_radps"], log["steer_rad"])
+    *alpha, a_y, rate, steer = (parabolas(y, width) for y in channels)
+    a_x, force = (parabolas(y, width) for y in along_the_car(vehicle, log))
+    # The slope of a local parabola fades sooner with frequency than its value does: next to values
+    # it would be too small, and the stiffness with it.
+    turning = np.gradient(rate, 1.0 / log.rate_hz)
+    pulled = pulled_sideways(vehicle, force, steer)
+    front, rear = load_shares(vehicle, a_x)
+    columns = (
+        alpha[0] * front * np.cos(np.nan_to_num(steer)),
+        alpha[1] * rear,
+        a_y / (1.0 + roll) - pulled / vehicle.mass_kg,
+        turning - vehicle.lf_m * pulled / yaw_inertia(vehicle),
+    )
+    return np.column_stack(columns), alpha
 
 
 def _clear(
@@ -328,14 +363,6 @@ def _clear(
     return np.asarray(noise <= noise[order][np.argmin(variance)])
 
 
-def _bent(tyre: Tyre, slip_rad: FloatArray, used: FloatArray) -> FloatArray:
-    """Share of the stiffness by which a secant at the slips used so far falls short of it."""
-    weight = np.where((used > 0.5) & np.isfinite(slip_rad), slip_rad**2, 0.0)
-    straight = tyre.cornering_stiffness_per_load * np.where(weight > 0.0, slip_rad, 1.0)
-    short = 1.0 - tyre.friction(np.where(weight > 0.0, slip_rad, 0.0)) / straight
-    return np.asarray(np.abs(np.cumsum(weight * short)) / np.maximum(np.cumsum(weight), 1e-12))
-
-
 def _faded(slip_rad: FloatArray, noise: FloatArray, used: FloatArray) -> FloatArray:
     """Share by which noise of that variance in the slips used so far makes the stiffness small."""
     known = (used > 0.5) & np.isfinite(slip_rad) & np.isfinite(noise)
@@ -349,25 +376,6 @@ def _root_mean(noise: FloatArray, used: FloatArray) -> FloatArray:
     known = (used > 0.5) & np.isfinite(noise)
     squares = np.cumsum(np.where(known, noise**2, 0.0))
     return np.asarray(np.sqrt(squares / np.maximum(np.cumsum(known), 1)))
-
-
-def _parabolas(y: FloatArray, width: int) -> FloatArray:
-    """Local parabolas over `width` samples; NaN where too much is missing.
-
-    Holes of up to half a window are interpolated first: the parabolas hardly feel them. Longer ones
-    stay, and so do stretches between them that are shorter than a window.
-    """
-    out = np.full(y.size, np.nan)
-    known = np.flatnonzero(np.isfinite(y))
-    if known.size == 0:
-        return out
-    cuts = np.flatnonzero(np.diff(known) > width // 2 + 1) + 1
-    for part in np.split(known, cuts):
-        rows = np.arange(part[0], part[-1] + 1)
-        if rows.size >= width:
-            dense = np.interp(rows, part, y[part])
-            out[rows] = scipy.signal.savgol_filter(dense, width, 2)
-    return out
 
 
 def _window_s(slip: FloatArray, noise: FloatArray, rate_hz: float) -> float:

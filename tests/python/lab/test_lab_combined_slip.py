@@ -53,6 +53,8 @@ def test_drive_and_brake_force_make_no_smaller_peak(driven: Callable[..., Log]) 
     assert "combined_slip=" not in heard
     plain, warned = fitted(log, combined_slip=False)
     assert ELLIPSE not in [e.name for e in plain.estimates]
+    assert "one load for both wheels of an axle" in str(fit)
+    assert "one load for both wheels of an axle" not in str(plain)
     assert "the readings ask for a friction ellipse of" in warned
     assert "identify with combined_slip=True" in warned
     for one, most in ((fit, 0.005), (plain, None)):

@@ -153,6 +153,32 @@ def test_a_slow_model_car_is_not_one_of_900_kg(
     check_car(log, mass_kg=car.mass_kg, wheelbase_m=car.wheelbase_m)
 
 
+@pytest.mark.parametrize("seed", [635, 404077])
+def test_a_model_car_that_is_driven_hard_is_not_one_of_900_kg(seed: int) -> None:
+    """At 6 to 12 m/s, and without a wheel force, which would tell the mass."""
+    own, other = model_cars.car(), replace(sv.example_vehicle(), mass_kg=900.0)
+    for driven in model_cars.drives(sv.Model(own), seed):
+        log = driven.without("fx_n")
+        told = (
+            r"wheelbase of 1\.\d* m at most .* lf_m \+ lr_m are 2\.6 m; the vehicle file is that of"
+        )
+        for few in (log, log.without("vy_mps")):
+            with pytest.raises(sv.InvalidInput, match=told):
+                check_car(few, mass_kg=other.mass_kg, wheelbase_m=other.wheelbase_m)
+            check_car(few, mass_kg=own.mass_kg, wheelbase_m=own.wheelbase_m)
+
+
+@pytest.mark.parametrize("rear", [1.0, 0.65])
+def test_a_car_that_is_driven_hard_is_itself(rear: float) -> None:
+    """Also one that oversteers."""
+    car = sv.example_vehicle()
+    car = replace(car, tyre_rear=car.tyre_rear.replace(B=rear * car.tyre_rear.B))
+    for seed, manoeuvre in enumerate((sv.manoeuvres.lap(60.0, 8.0, 20.0), sv.manoeuvres.slalom())):
+        log = sv.drive(sv.Model(car), manoeuvre, seed=seed)
+        for few in (log, log.without("fx_n", "vy_mps")):
+            check_car(few, mass_kg=car.mass_kg, wheelbase_m=car.wheelbase_m)
+
+
 @pytest.mark.parametrize("slope_rad", [0.0, 0.03])
 def test_a_car_that_only_manoeuvres_slowly_is_itself(slope_rad: float) -> None:
     """On hills, too: below 5 m/s no more than magnitudes are told."""

@@ -117,7 +117,10 @@ def _gauss_newton(
     """Levenberg-Marquardt whose every step is the best one within the box."""
 
     def linearised(x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        return problem.normal_equations(box.put(p, x), frozen, box.columns)
+        cost, gradient, information = problem.normal_equations(box.put(p, x), frozen, box.columns)
+        # Far away derivatives grow beyond all numbers sooner than errors do: no step begins there.
+        known = np.isfinite(gradient).all() and np.isfinite(information).all()
+        return cost if known else np.inf, gradient, information
 
     def cost_of(x: FloatArray) -> float:
         return problem.half_sum_of_squares(box.put(p, x), frozen)

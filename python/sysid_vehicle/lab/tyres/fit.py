@@ -61,6 +61,12 @@ NOISES = (
 
 TAKE_PROFILES = "take them from the profile likelihood (profiles=True, without --fast)"
 
+_ONE_FORCE = (
+    "The ellipse has one force and one load for both wheels of an axle; where an open differential "
+    "drives an inner wheel that corners unload, that is no part of the intervals: of simulated "
+    "two-track cars with up to 0.35 of their weight as drive force D was 10 to 18 % off"
+)
+
 _CHI_SQUARE = 3.84  # 95 % quantile, one degree of freedom
 _KNOWN_WELL = 0.05  # relative standard error
 _POSITIVE = (0.0, float("inf"))
@@ -347,6 +353,8 @@ class TyreFit(Estimated, Printed):
                 for e in self.estimates[:8]
             )
             lines.append(f"As likely to {number(rival.lost, 2)} nats: {values}")
+        if ELLIPSE in [e.name for e in self.estimates]:
+            lines.append(_ONE_FORCE)
         if self.bent:
             lines.append(f"Intervals not to be trusted: {', '.join(self.bent)}; {TAKE_PROFILES}")
         if self.undetermined:

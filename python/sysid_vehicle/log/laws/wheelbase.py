@@ -35,6 +35,7 @@ _NOT_A_WHEELBASE = 3.5
 _GRIP_MPS2, _GRIP_RAD, _GRIP_SHARE = 2.5, 0.15, 0.2
 _MODEL_CAR_M = 0.1  # the shortest wheelbase of a car on a scale, 1:24
 _NO_DRIVER_M = 0.9  # karts for children have more
+_FASTEST = 0.9  # quantile of the speeds, at which oversteer takes most from the steering
 _STEERED = 0.5  # coherence from which a wheelbase is told
 _LEAST_OFFSET_RAD = 1e-6  # a steering angle that stays at zero has no size
 
@@ -71,6 +72,29 @@ def _steering(drive: Drive) -> _Steering | None:
     offset = max(OFFSET * size_of(steer[rows]), _LEAST_OFFSET_RAD)
     answer = fit(steer[rows], columns, [np.inf, np.inf, offset])
     return _Steering(ay, steer, rows, answer, cosine(curvature[rows], steer[rows]))
+
+
+def longest_wheelbase(drive: Drive, understeer: float) -> tuple[float, str] | None:
+    """The longest wheelbase [m] that turns so by so little steering, and where; None if not told.
+
+    However hard the car is driven, as long as it does not slide. Less steering than the wheelbase
+    asks for is oversteer, of which a car has so much at most.
+
+    Parameters
+    ----------
+    drive : Drive
+    understeer : float
+        Size of the largest gradient, either way [rad per m/s2].
+    """
+    law = _steering(drive)
+    if law is None or law.answer.coherence < _STEERED:
+        return None
+    base, deviation = float(law.answer.coefficients[0]), float(law.answer.deviations[0])
+    if base <= 3.0 * deviation:
+        return None
+    fast = float(np.quantile(drive.mean(drive.motion.channels["vx_mps"])[law.rows], _FASTEST))
+    place = drive.place(np.where(law.rows, law.steer, 0.0))
+    return base + 3.0 * deviation + understeer * fast**2, place
 
 
 def is_model_car(drive: Drive, wheelbase_m: float | None = None) -> bool:
