@@ -62,8 +62,8 @@ def study() -> Iterator[sv.Study]:
         excited_by=EVIL,
     )
     truth = sv.Model(car).add(effect).with_values({"evil.gain": 4000.0})
-    train = sv.drive(truth, sv.manoeuvres.lap(30.0), seed=1, rate_hz=25.0, name=EVIL)
-    test = sv.drive(truth, sv.manoeuvres.handling_course(25.0), seed=2, rate_hz=25.0, name=EVIL)
+    train = sv.drive(truth, sv.manoeuvres.lap(30.0), seed=1, rate_hz=50.0, name=EVIL)
+    test = sv.drive(truth, sv.manoeuvres.handling_course(25.0), seed=2, rate_hz=50.0, name=EVIL)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sv.SysidWarning)
         yield sv.improve(
