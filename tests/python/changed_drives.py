@@ -7,7 +7,7 @@ LATE = ("steer_delay", "steer_lag")
 FEW = ("steer_offset", "steer_ratio", "steer_delay")
 
 
-def later(truth: Model, rate_hz: float = 50.0, **values: float) -> Log:
+def later(truth: Model, rate_hz: float = 25.0, **values: float) -> Log:
     """A quarter of a minute of other driving of the car, with parameters of effects."""
     told = {name.replace("__", "."): value for name, value in values.items()}
     more = [n.split(".")[0] for n in told if "." in n and n.split(".")[0] not in truth.effects]

@@ -7,9 +7,10 @@ from sysid_vehicle import Change, Fit, Model, changed, drive, identify, manoeuvr
 
 
 @pytest.fixture(scope="module")
-def before(start: Model, truth: Model) -> Fit:
-    """A reference of half a lap: searches take as long as the driving."""
-    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=1, rate_hz=50.0), starts=1)
+def before(request: pytest.FixtureRequest, start: Model, truth: Model) -> Fit:
+    """A reference of half a lap, at `RATE_HZ` of the file: searches take as long as the samples."""
+    rate_hz = getattr(request.module, "RATE_HZ", 25.0)
+    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=1, rate_hz=rate_hz), starts=1)
 
 
 @pytest.fixture(scope="module")

@@ -144,7 +144,7 @@ def test_what_both_share_need_not_be_nothing(truth: Model, start: Model) -> None
     delay = "steer_delay.delay_s"
     late = truth.add("steer_delay").with_values({delay: 0.03})
     before = identify(start, drive(late, manoeuvres.lap(20.0), seed=7, rate_hz=50.0), starts=1)
-    early = changed_drives.later(truth, steer_delay__delay_s=-0.01)
+    early = changed_drives.later(truth, 50.0, steer_delay__delay_s=-0.01)
     change = changed(before, early, candidates=LATE)
     assert [e.id for e in change.named] == ["steer_delay"]
     assert inside(change, "steer_delay", -0.04)

@@ -26,14 +26,14 @@ RIVALS = ("lateral_load_transfer", "mass")
 
 @pytest.fixture(scope="module")
 def before(start: Model, truth: Model) -> Fit:
-    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=11, rate_hz=50.0), starts=1)
+    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=11, rate_hz=25.0), starts=1)
 
 
 def driven(truth: Model, friction: float, stiffness: float, mps2: float) -> Log:
     factors = {"D": friction, "B": stiffness / friction}
     names = [(f"{letter}_{axle}", f) for letter, f in factors.items() for axle in AXLES]
     car = truth.with_values({n: f * truth.value(n) for n, f in names})
-    return drive(car, manoeuvres.lap(20.0, lateral_mps2=mps2), seed=12, rate_hz=50.0)
+    return drive(car, manoeuvres.lap(20.0, lateral_mps2=mps2), seed=12, rate_hz=25.0)
 
 
 def test_a_wet_road_is_told_as_less_friction_of_both_axles(truth: Model, before: Fit) -> None:

@@ -20,7 +20,7 @@ HEAVIER = 0.15
 
 
 def driven(model: sv.Model, seed: int) -> sv.Log:
-    return sv.drive(model, sv.manoeuvres.lap(20.0), seed=seed, rate_hz=50.0)
+    return sv.drive(model, sv.manoeuvres.lap(20.0), seed=seed, rate_hz=25.0)
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from sysid_vehicle.diagnose.changed import _beside_unknown, _later
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
 
+RATE_HZ = 50.0  # of the reference, whose noise stays as it is to the last digit
 NAMES = ("steer_offset", "unknown F_x", "unknown dv_x/dt", "unknown M_z")
 INFORMATION = 1e4
 

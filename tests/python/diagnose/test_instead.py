@@ -102,5 +102,5 @@ def test_noise_of_the_steering_is_no_unknown_force(seed: int) -> None:
         *(lambda t: 20.0 + 4.0 * np.sin(0.1 * t), lambda t: 3.0 * np.sin(0.35 * t) ** 3),
         tracks_path=True,
     )
-    fit = identify(model, drive(model, road, seed=seed, rate_hz=50.0, noise=noise))
+    fit = identify(model, drive(model, road, seed=seed, rate_hz=50.0, noise=noise), starts=1)
     assert instead(fit, fit.driving, ()).omnibus.p_value > 0.01

@@ -40,8 +40,8 @@ class Wind(RoadDisturbance):
 
 
 def blown(truth: Model, manoeuvre: manoeuvres.Manoeuvre, seed: int) -> Log:
-    calm = drive(truth, manoeuvre, seed=seed)["vx_mps"]
-    return drive(truth, manoeuvre, seed=seed, disturbance=Wind(calm))
+    calm = drive(truth, manoeuvre, seed=seed, rate_hz=50.0)["vx_mps"]
+    return drive(truth, manoeuvre, seed=seed, disturbance=Wind(calm), rate_hz=50.0)
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,9 @@ def dragged(hidden_fit: Callable[[str, float], Fit]) -> Where:
 @pytest.fixture(scope="module")
 def wet(truth: Model, start: Model) -> Where:
     values = {"friction_change.drop": 0.15, "friction_change.at_s": 15.0}
-    log = drive(truth.add("friction_change").with_values(values), manoeuvres.lap(30.0), seed=3)
+    log = drive(
+        truth.add("friction_change").with_values(values), manoeuvres.lap(30.0), seed=3, rate_hz=50.0
+    )
     return where(identify(start, log, starts=1))
 
 

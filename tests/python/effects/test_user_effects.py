@@ -118,7 +118,7 @@ def test_its_derivatives_are_exact() -> None:
         force_y_front=lambda d, p: p.gain * np.tanh(30.0 * d.alpha_f) * (d.F_zf / 4000.0) ** 2,
     )
     car = sv.example_vehicle()
-    log = sv.drive(Model(car), sv.manoeuvres.sine_sweep(), seed=3)
+    log = sv.drive(Model(car), sv.manoeuvres.sine_sweep(), seed=3, rate_hz=50.0)
     driving = sv.Driving.of(log)
     model = Model(car).add("my_grip").with_values({"my_grip.gain": 200.0})
     problem = driving.problem(model)

@@ -383,7 +383,7 @@ def test_a_hidden_effect_with_a_state_is_found(tmp_path: Path) -> None:
         for i, m in enumerate(manoeuvres)
     ]
     few = ["heat", "steer_lag", "gyro_bias", "mass", "aero_drag"]
-    study = sv.improve(Model(car), logs[0], logs[1], candidates=few)
+    study = sv.improve(Model(car), logs[0], logs[1], candidates=few, starts=1, sensors=False)
     assert [a.id for a in study.added] == ["heat"]
     for name, value in (("heat.gain", 30.0), ("heat.time_constant_s", 5.0)):
         found = study.fit[name]

@@ -32,7 +32,7 @@ def runs(car: Vehicle) -> dict[str, Log]:
     made = {}
     for seed, (name, error) in enumerate(LOADS.items()):
         truth = Model(car).add("mass").with_values({LOAD: error})
-        made[name] = drive(truth, manoeuvres.lap(20.0), seed=40 + seed, rate_hz=50.0)
+        made[name] = drive(truth, manoeuvres.lap(20.0), seed=40 + seed, rate_hz=25.0)
     return made
 
 

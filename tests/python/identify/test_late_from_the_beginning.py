@@ -15,7 +15,7 @@ def test_the_beginning_of_a_delay_is_no_lag(truth: Model, seed: int) -> None:
     late = truth.add("steer_delay").with_values({"steer_delay.delay_s": DELAY_S})
     course = manoeuvres.handling_course(15.0, lateral_mps2=8.0)
     exact = replace(SensorNoise(), steer_rad=0.0)
-    log = drive(late, course, seed=seed, noise=exact)
+    log = drive(late, course, seed=seed, noise=exact, rate_hz=50.0)
 
     def fitted(*effects: str) -> Fit:
         return identify(truth.add(*effects), log, starts=1)

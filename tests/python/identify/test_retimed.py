@@ -25,7 +25,7 @@ def model() -> Model:
 
 @pytest.fixture(scope="module")
 def log(model: Model) -> Log:
-    return drive(model, manoeuvres.slalom(), seed=4)
+    return drive(model, manoeuvres.slalom(), seed=4, rate_hz=50.0)
 
 
 @pytest.fixture(scope="module")

@@ -73,7 +73,9 @@ def test_what_is_identified_does_not_follow_a_frozen_speed(driven: Columns) -> N
     right = {n: model.value(n) for n in ("D_front", "D_rear")}
     log, told = read(frozen(driven, "vx_mps", "vy_mps"))
     assert len(told) == 2
-    fit = sv.identify(model, log, starts=1)
+    with pytest.warns(sv.SysidWarning, match="no values at samples 750 to 1149"):
+        half = sv.Log.from_arrays({c: log[c][::2] for c in log}, check=False)
+    fit = sv.identify(model, half, starts=1)
     for name, value in right.items():
         assert abs(fit[name].value - value) < 4.0 * fit[name].std
     assert fit.noise.sensor[0] < 0.05

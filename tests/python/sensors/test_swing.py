@@ -33,7 +33,7 @@ def rolling(log: sv.Log, above_m: float, natural_hz: float, damping: float) -> s
 def lap() -> sv.Log:
     model = sv.Model(sv.example_vehicle())
     quiet = sv.SensorNoise(ay_mps2=0.0)
-    return sv.drive(model, sv.manoeuvres.lap(60.0), noise=quiet, seed=11)
+    return sv.drive(model, sv.manoeuvres.lap(60.0), noise=quiet, seed=11, rate_hz=50.0)
 
 
 @pytest.fixture(scope="module")

@@ -43,7 +43,7 @@ def test_sizes_of_effects_are_as_unsure_wherever_they_stand(
 def test_effects_and_verdicts_tell_one_size(start: Model, truth: Model) -> None:
     sizes = {"gyro_bias.bias_radps": 0.02, "steer_ratio.ratio_error": 0.12}
     car = truth.add("gyro_bias", "steer_ratio").with_values(sizes)
-    train, test = (drive(car, manoeuvres.lap(20.0), seed=s, rate_hz=50.0) for s in (65, 66))
+    train, test = (drive(car, manoeuvres.lap(20.0), seed=s, rate_hz=25.0) for s in (65, 66))
     few = ["steer_ratio", "mass"]
     study = improve(start, train, test, candidates=few, starts=1, sensors=False)
     assert study.verdict in ("unknown", "partly_explained")

@@ -26,7 +26,7 @@ def laps(*cars: Model, duration_s: float = 30.0) -> list[Log]:
     """Laps, each by another car."""
     lap = manoeuvres.lap(duration_s)
     return [
-        drive(car, lap, seed=662900 + i, rate_hz=50.0, name=f"set {i + 1}")
+        drive(car, lap, seed=662900 + i, rate_hz=25.0, name=f"set {i + 1}")
         for i, car in enumerate(cars)
     ]
 

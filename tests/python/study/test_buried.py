@@ -24,7 +24,7 @@ def driven(**hidden: float) -> list[Log]:
     car = Model(example_vehicle()).add(*hidden)
     car = car.with_values({n: hidden[n.partition(".")[0]] for n in car.names if "." in n})
     both = (manoeuvres.lap(40.0), manoeuvres.handling_course(40.0))
-    return [drive(car, m, seed=seed, rate_hz=50.0) for seed, m in enumerate(both, 1)]
+    return [drive(car, m, seed=seed, rate_hz=25.0) for seed, m in enumerate(both, 1)]
 
 
 def studied(logs: Sequence[Log], *candidates: str) -> Study:

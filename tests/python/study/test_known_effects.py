@@ -19,9 +19,9 @@ def start() -> sv.Model:
 def logs(start: sv.Model) -> tuple[sv.Log, sv.Log]:
     hidden = {"steer_compliance.compliance_radpn": 1.5e-6}
     truth = start.add("steer_compliance").with_values({**KNOWN, **hidden})
-    lap = sv.drive(truth, sv.manoeuvres.lap(40.0), seed=71, rate_hz=50.0)
+    lap = sv.drive(truth, sv.manoeuvres.lap(40.0), seed=71, rate_hz=25.0)
     course = sv.manoeuvres.handling_course(40.0)
-    return lap, sv.drive(truth, course, seed=72, rate_hz=50.0)
+    return lap, sv.drive(truth, course, seed=72, rate_hz=25.0)
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ def logs(truth: Model) -> tuple[Log, Log]:
     hidden = {"steer_lag.time_constant_s": 0.06, "aero_drag.drag_area_m2": 0.45}
     car = truth.add("steer_lag", "aero_drag").with_values(hidden)
     drives = manoeuvres.lap(20.0), manoeuvres.handling_course(20.0)
-    first, second = (drive(car, m, seed=s, rate_hz=50.0) for s, m in enumerate(drives, 91))
+    first, second = (drive(car, m, seed=s, rate_hz=25.0) for s, m in enumerate(drives, 91))
     return first, second
 
 

@@ -35,7 +35,7 @@ def test_what_a_poorer_model_put_into_them_goes_back_to_the_effect() -> None:
     hidden = {"aero_downforce.cl_a_front_m2": 0.7, "aero_downforce.cl_a_rear_m2": 1.1}
     car = Model(example_vehicle())
     truth = car.add("aero_downforce").with_values(hidden)
-    whole = drive(truth, manoeuvres.handling_course(40.0, 7.0), seed=8731, rate_hz=50.0)
+    whole = drive(truth, manoeuvres.handling_course(40.0, 7.0), seed=8731, rate_hz=25.0)
     short = [whole.between(t, t + 6.0) for t in (2.0, 10.0, 18.0, 26.0, 33.5)]
     found = improve(
         car.with_nuisances(),

@@ -18,7 +18,7 @@ ALIKE = ["aero_drag", "rolling_resistance"]
 @pytest.fixture(scope="module")
 def baseline(start: Model, truth: Model) -> Fit:
     car = truth.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.6})
-    return identify(start, drive(car, manoeuvres.lap(15.0), seed=61, rate_hz=50.0), starts=1)
+    return identify(start, drive(car, manoeuvres.lap(15.0), seed=61, rate_hz=25.0), starts=1)
 
 
 @pytest.fixture(scope="module")

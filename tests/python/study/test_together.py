@@ -25,7 +25,7 @@ from sysid_vehicle.study.search.together import (
 )
 from sysid_vehicle.study.search.trail import Trail
 
-RATE_HZ = 50.0  # tells as much of these effects as 100 Hz, in half the time
+RATE_HZ = 25.0  # tells as much of these effects as 100 Hz, in less than half the time
 
 
 class Known(SimpleNamespace):

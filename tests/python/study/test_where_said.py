@@ -11,7 +11,7 @@ from sysid_vehicle.study.judge.structure import Structure
 
 @pytest.fixture(scope="module")
 def adequate(start: Model, truth: Model) -> Study:
-    train, test = (drive(truth, manoeuvres.lap(20.0), seed=s, rate_hz=50.0) for s in (61, 62))
+    train, test = (drive(truth, manoeuvres.lap(20.0), seed=s, rate_hz=25.0) for s in (61, 62))
     few = ["mass", "steer_lag"]
     return improve(start, train, test, candidates=few, starts=1, sensors=False)
 

@@ -158,11 +158,11 @@ class Replay:
         ends = self._ends(problem, (p.copy(), *self._bent(p)), frozen, box)
         enough = min(cost for cost, _ in ends) + _AS_GOOD
         peaks = [model.parameters[f"D_{axle}"].column for axle in AXLES]
-        _, other = max(
-            ((cost, end) for cost, end in ends if cost <= enough),
-            key=lambda end: float(np.sum(np.abs(np.log(end[1][peaks] / p[peaks])))),
-        )
-        return model.from_vector(other)
+
+        def away(end: FloatArray) -> float:
+            return float(np.sum(np.abs(np.log(end[peaks] / p[peaks]))))
+
+        return model.from_vector(max((end for cost, end in ends if cost <= enough), key=away))
 
     @staticmethod
     def _ends(
