@@ -37,8 +37,7 @@ from ._core_twin import observe14 as observe14
 from ._core_twin import observe_double_track as observe_double_track
 
 _Array = npt.NDArray[np.float64]
-_Step = tuple[int, tuple[int, int, int], float]  # operation, operands, constant
-_Steps = Sequence[_Step]
+_Steps = Sequence[tuple[int, tuple[int, int, int], float]]  # operation, operands, constant
 _OwnState = tuple[_Steps, _Steps, _Steps | None]  # rate, decay, initial
 # Place, channels, what is added to, states.
 _User = tuple[int, Sequence[int], Sequence[tuple[int, _Steps]], Sequence[_OwnState]]
