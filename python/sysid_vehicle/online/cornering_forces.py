@@ -22,6 +22,9 @@ _STIFFNESSES = np.geomspace(1.5, 80.0, 33)  # over load [1/rad]: what tyres have
 # Lateral accelerations at which a steering angle is compared with the path, and the least of it; of
 # logs with more than that share beyond the hard one the ratio is up to 1.5 in right ones.
 _GENTLE_MPS2, _EXCITED_MPS2, _HARD_MPS2, _HARD_SHARE = 4.0, 0.5, 5.0, 0.002
+# Square of the speed over the wheelbase up to which the path turns the wheels more than slip does;
+# beyond, right logs of fast lane changes tell 1.1 to 1.4.
+_SLOW_MPS2 = 100.0
 _WRONG_STEER = 1.2  # a v_y that is measured half a metre elsewhere does as much
 _FEWEST_ROWS = 60
 _LEAST_RATIO = 0.5  # of secant and slope; beyond no stiffness is told
@@ -117,6 +120,7 @@ def times_road_wheels(
     force = (vehicle.lr_m * a_y + turning) / vehicle.wheelbase_m
     columns = np.column_stack([steer, force, force**3, np.ones(force.size)])
     known = np.isfinite(path) & np.isfinite(columns).all(axis=1) & (np.abs(a_y) < _GENTLE_MPS2)
+    known &= np.square(v_x) < _SLOW_MPS2 * vehicle.wheelbase_m
     driven = np.isfinite(path) & np.isfinite(a_y)
     if np.count_nonzero(driven & (np.abs(a_y) > _HARD_MPS2)) > _HARD_SHARE * driven.sum():
         return None  # bodies that roll and tyres that slide turn the car otherwise
