@@ -278,7 +278,7 @@ def test_states_of_effects_begin_with_the_motion_and_not_with_its_reading(
     slow = truth.add("tyre_relaxation").with_values(
         {"tyre_relaxation.relaxation_length_m": length_m}
     )
-    logs = [drive(slow, drives.lap(15.0), seed=s, rate_hz=25.0) for s in (31, 32)]
+    logs = [drive(slow, drives.lap(15.0), seed=s, rate_hz=50.0) for s in (31, 32)]
     moved = [
         altered(
             log, steer_rad=log["steer_rad"] + steer, yaw_rate_radps=log["yaw_rate_radps"] + 0.01

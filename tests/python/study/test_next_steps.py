@@ -36,7 +36,7 @@ from sysid_vehicle.study.results.sentences import ahead, in_the_end, small
 
 @pytest.fixture(scope="module")
 def adequate(start: Model, truth: Model) -> Study:
-    train, test = (drive(truth, manoeuvres.lap(20.0), seed=s, rate_hz=25.0) for s in (61, 62))
+    train, test = (drive(truth, manoeuvres.lap(20.0), seed=s, rate_hz=50.0) for s in (61, 62))
     few = ["mass", "steer_lag"]
     return improve(start, train, test, candidates=few, starts=1, sensors=False)
 
@@ -45,7 +45,7 @@ def adequate(start: Model, truth: Model) -> Study:
 def unknown(start: Model, truth: Model) -> Study:
     """Nothing in the catalogue that may be tried turns the yaw rate by a constant."""
     biased = truth.add("gyro_bias").with_values({"gyro_bias.bias_radps": 0.02})
-    train, test = (drive(biased, manoeuvres.lap(20.0), seed=s, rate_hz=25.0) for s in (63, 64))
+    train, test = (drive(biased, manoeuvres.lap(20.0), seed=s, rate_hz=50.0) for s in (63, 64))
     few = ["mass", "aero_drag"]
     return improve(start, train, test, candidates=few, starts=1, sensors=False)
 
@@ -151,7 +151,7 @@ def test_only_what_the_driving_leaves_open_asks_for_harder_driving(unknown: Stud
 
 def test_drives_that_tell_another_car_are_said_to(unknown: Study, truth: Model) -> None:
     gripping = truth.with_values({"B_front": 1.4 * truth.value("B_front")})
-    other = Driving.of(drive(gripping, manoeuvres.lap(20.0), seed=65, rate_hz=25.0))
+    other = Driving.of(drive(gripping, manoeuvres.lap(20.0), seed=65, rate_hz=50.0))
     found = replace(unknown, validation=other)
     first = found.disagreements[0]
     assert first.train.name == "cornering stiffness front"
@@ -164,7 +164,7 @@ def test_drives_that_tell_another_car_are_said_to(unknown: Study, truth: Model) 
 
 def test_drives_of_one_car_agree(adequate: Study, truth: Model) -> None:
     for seed in (66, 67, 68):
-        other = Driving.of(drive(truth, manoeuvres.handling_course(20.0), seed=seed, rate_hz=25.0))
+        other = Driving.of(drive(truth, manoeuvres.handling_course(20.0), seed=seed, rate_hz=50.0))
         assert disagreements(adequate.fit, other) == ()
 
 
@@ -175,7 +175,7 @@ def test_offsets_that_differ_from_log_to_log_are_no_disagreement(truth: Model) -
             biased.with_values({"accelerometer_bias.ay_mps2": bias}),
             manoeuvres.lap(20.0),
             seed=69,
-            rate_hz=25.0,
+            rate_hz=50.0,
         )
         for bias in (0.25, -0.25)
     ]

@@ -233,12 +233,16 @@ class _Ahead:
         """Principal directions, one standard error long, of what slopes were smoothed with.
 
         Slopes take up what a wrong mass or force leaves: windows that know them begin with the
-        likelihood's parameters, and tell these no better. Shape (n, n); (n, 0) on a level road.
+        likelihood's parameters, and tell these no better. Shape (n, m); (n, 0) on a level road.
         """
         if not self.fit.noise.sloping:
             return np.empty((len(self.box.columns), 0))
         values, vectors = np.linalg.eigh(self.fit.covariance)
-        return as_float64(vectors * np.sqrt(np.maximum(values, 0.0)))
+        directions = vectors * np.sqrt(np.maximum(values, 0.0))
+        # What the likelihood found elsewhere may have been fewer parameters, or others.
+        rows = {e.name: row for e, row in zip(self.fit.estimates, directions, strict=False)}
+        none = np.zeros(len(values))
+        return np.array([rows.get(n, none) for n in self.fit.model.free_names])
 
     def trimmed(self, look: _Look) -> float:
         """Mean square of the windows in which the car turns, without those that err most."""
