@@ -8,7 +8,7 @@ from typing import Any
 
 from .._common.files import as_path
 from .._common.typed import typed
-from ..errors import InvalidInput, warn
+from ..errors import warn
 from ..log import Columns, Log
 from ..vehicle import Vehicle
 from .formats.csv import read_table
@@ -20,7 +20,7 @@ from .mapping.proposal import Proposal
 from .mapping.propose import propose_channels
 from .mapping.source import Source
 from .recording import Recording
-from .registry import FORMATS, Format, blamed, read_with, recognised
+from .registry import FORMATS, Format, blamed, located, read_with, recognised
 from .table import Table
 
 __all__ = [
@@ -76,8 +76,9 @@ def read_log(
     Raises
     ------
     InvalidInput
-        If the file, the channel map or the data cannot be used; the message names the channel, the
-        sample or line, and the remedy. If a library is absent it names the extra that brings it.
+        If the file, the channel map or the data cannot be used; the message names the file, the
+        channel, the sample or line, and the remedy. If a library is absent it names the extra that
+        brings it.
 
     Warns
     -----
@@ -96,19 +97,19 @@ def read_log(
     path = as_path(source) if is_path else None
     run = name if name is not None else "log" if path is None else path.stem
     entry = None if path is None else recognised(path)
+    where = run if path is None else str(path)
     notes: list[str] = []
-    try:
-        with blamed(entry, run if path is None else path):
-            table = contents(source, dbc, entry)
-            if isinstance(table, Recording):
-                table = mapping.rows_of(table, notes)
+    with located(where), blamed(entry, where):
+        table = contents(source, dbc, entry)
+        if isinstance(table, Recording):
+            table = mapping.rows_of(table, notes)
+    with located(where):
         columns = mapping.apply(table, notes)
-    except InvalidInput as error:
-        raise InvalidInput(f"{run}: {error}") from error
     for note in notes:
         warn(f"{run}: {note}")
     despike = mapping.despiked
-    return Log.from_arrays(columns, name=run, despike=despike, check=check, vehicle=vehicle)
+    with located(where, run):
+        return Log.from_arrays(columns, name=run, despike=despike, check=check, vehicle=vehicle)
 
 
 def contents(

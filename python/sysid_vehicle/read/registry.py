@@ -211,6 +211,19 @@ def blamed(entry: Format | None, path: object) -> Iterator[None]:
         ) from error
 
 
+@contextmanager
+def located(where: str, run: str | None = None) -> Iterator[None]:
+    """Whatever is refused inside the block names the file, in place of the name of the run."""
+    try:
+        yield
+    except InvalidInput as error:
+        told = str(error)
+        if told.startswith((f"{where}: ", f"{where}{os.sep}")):  # also of a file of a folder
+            raise
+        told = told if run is None else told.removeprefix(f"{run}: ")
+        raise InvalidInput(f"{where}: {told}") from error
+
+
 def require(entry: Format, who: str) -> None:
     """Raise :class:`InvalidInput` that names the extra if a library of a format is absent."""
     for library in entry.libraries:

@@ -151,7 +151,7 @@ def _refused_or_read(path: Path) -> None:
         except InvalidInput as error:
             refusal = str(error)
     assert [w for w in caught if not issubclass(w.category, SysidWarning)] == []
-    assert refusal is None or refusal.startswith("run: ")
+    assert refusal is None or refusal.startswith(f"{path}: ")
 
 
 def test_csv_writer_of_others_is_understood(tmp_path: Path) -> None:

@@ -354,5 +354,5 @@ def test_names_that_toml_cannot_hold() -> None:
 
 def test_what_is_wrong_with_a_file_is_said_with_its_name(tmp_path: Path) -> None:
     (tmp_path / "nothing.csv").write_text("")
-    with pytest.raises(InvalidInput, match=r"nothing\.csv: the first line is empty"):
+    with pytest.raises(InvalidInput, match=r"nothing\.csv: the file holds nothing"):
         sv.propose_channels(tmp_path / "nothing.csv")

@@ -1,5 +1,6 @@
 """CSV files and channel maps: foreign columns, odd formats, and mistakes named by line."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +103,9 @@ def test_empty_cells_are_missing_measurements(tmp_path: Path, cell: str) -> None
         ([HEADER, "0,20", *ROWS], ["line 2", "2 cells", "header has 6", "delete the line"]),
         ([HEADER, ROWS[0], '0.01,"' + 140000 * "x"], ["line 3", "not a CSV row", "quotes"]),
         ([HEADER], ["no rows"]),
-        ([""], ["first line is empty", "column names"]),
+        ([""], ["the file holds nothing; record or export the log again"]),
+        (["# one", " ", "#"], ["holds nothing but comments and empty lines"]),
+        (["", "0,20", "1,20"], ["first line is empty", "column names"]),
         (ROWS, ["first line holds numbers", "column names"]),
         ([HEADER + ",vx_mps", *(r + ",1" for r in ROWS)], ["vx_mps: 2 columns", "delete one"]),
         ([HEADER, *ROWS[:1]], ["time_s: only 1 sample"]),
@@ -112,7 +115,8 @@ def test_empty_cells_are_missing_measurements(tmp_path: Path, cell: str) -> None
 def test_broken_files(tmp_path: Path, lines: list[str], words: list[str]) -> None:
     with pytest.raises(InvalidInput) as caught:
         read(write(tmp_path, *lines))
-    for word in ["run: ", *words]:
+    assert str(caught.value).startswith(f"{tmp_path}{os.sep}run.csv: ")
+    for word in words:
         assert word in str(caught.value)
 
 

@@ -11,7 +11,7 @@ from log_formats import FACTORS, FAST, MAP, SLOW, UNITS, check_values, measured,
 
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.log import Log
-from sysid_vehicle.read import FORMATS, read_log
+from sysid_vehicle.read import FORMATS, propose_channels, read_log
 
 pytestmark = pytest.mark.filterwarnings(
     # What the libraries say of themselves and of each other.
@@ -302,7 +302,7 @@ class TestRegistry:
         path.write_bytes(entry.signatures[0] + bytes(200))
         with pytest.raises(InvalidInput) as caught:
             read_log(path)
-        assert f"run: {path}: is {entry.what}" in str(caught.value)
+        assert str(caught.value).startswith(f"{path}: is {entry.what}")
         assert f"pip install 'sysid-vehicle[{entry.extra}]'" in str(caught.value)
 
     @pytest.mark.parametrize(
@@ -315,9 +315,28 @@ class TestRegistry:
             pytest.importorskip(library)
         path = tmp_path / "run.dat"
         path.write_bytes(entry.signatures[0] + bytes(range(256)) * 3)
-        with pytest.raises(InvalidInput, match=r"run: .*run\.dat: (is|begins as) ") as caught:
+        with pytest.raises(InvalidInput, match=r"^/.*run\.dat: (is|begins as) ") as caught:
             read_log(path)
+        assert str(caught.value).count(str(path)) == 1
         assert entry.what in str(caught.value)
+
+    @pytest.mark.parametrize("suffix", sorted({s for f in FORMATS for s in f.suffixes if s != "/"}))
+    def test_a_file_that_holds_nothing_is_named(self, tmp_path: Path, suffix: str) -> None:
+        path = tmp_path / f"run{suffix}"
+        path.write_bytes(b"")
+        told = f"{path}: the file holds nothing; record or export the log again"
+        for reader in (read_log, propose_channels):
+            with pytest.raises(InvalidInput) as caught:
+                reader(path)
+            assert str(caught.value) == told
+
+    def test_what_the_checks_of_a_log_refuse_names_the_file_too(self, tmp_path: Path) -> None:
+        path = tmp_path / "run.csv"
+        header = "time_s,vx_mps,yaw_rate_radps,ay_mps2,steer_rad\n"
+        path.write_text(header + "0,20,0,0,0\n1,20,0,inf,0\n")
+        with pytest.raises(InvalidInput) as caught:
+            read_log(path, name="second lap")
+        assert str(caught.value).startswith(f"{path}: ay_mps2: infinite at sample 1")
 
 
 class TestRows:

@@ -64,6 +64,9 @@ def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
     _, cells = next(_rows(header, delimiter, 1), (1, []))
     names = tuple(name.strip() for name in cells)
     if not any(names):
+        if not any(line.strip() and not line.startswith("#") for line in text.split("\n")):
+            held = "nothing but comments and empty lines" if text.strip() else "nothing"
+            raise InvalidInput(f"the file holds {held}; record or export the log again")
         raise InvalidInput("the first line is empty; it must hold the column names")
     if all(is_number(name) for name in names):
         raise InvalidInput(

@@ -10,11 +10,11 @@ import numpy as np
 from ..._common.arrays import FloatArray
 from ..._common.files import as_path
 from ..._common.typed import typed
-from ...errors import InvalidInput, warn
+from ...errors import warn
 from ...log import CHANNELS, COMMANDS, Columns, Log, standing
 from ...vehicle import Vehicle
 from ..recording import Recording
-from ..registry import blamed, recognised
+from ..registry import blamed, located, recognised
 from ..units import factor_to
 from .ground import PARTS
 from .look import Signal, View, by_name, ended, even, ranked, stated
@@ -78,13 +78,9 @@ def propose_channels(
         source = {name: source[name] for name in source.channels}
     is_path = isinstance(source, (str, Path))
     entry = recognised(as_path(source)) if is_path else None
-    with blamed(entry, as_path(source) if is_path else "log"):
-        try:
-            held = contents(source, dbc, entry)
-        except InvalidInput as error:
-            if not is_path or as_path(source).name in str(error):
-                raise
-            raise InvalidInput(f"{source}: {error}") from error
+    where = str(as_path(source)) if is_path else "log"
+    with located(where), blamed(entry, where):
+        held = contents(source, dbc, entry)
         for left in held.left_out if isinstance(held, Recording) else ():
             warn(f"{as_path(source).stem if is_path else 'log'}: {left}")
         view = View(held)
