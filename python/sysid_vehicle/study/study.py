@@ -53,7 +53,7 @@ from .results.next_steps import next_steps
 from .results.predicting import Predicting, predicting
 from .results.printed import as_html, as_text
 from .results.record import record
-from .results.sentences import in_the_end, small
+from .results.sentences import in_the_end, sufficient_baseline
 from .results.widened import estimates_of
 from .validation import at_its_best
 
@@ -296,9 +296,9 @@ class Study:
         return told_differently(self.fit, self.rules) if self.verdict in LACKING else []
 
     @cached_property
-    def small(self) -> bool:
-        """Whether errors 0.5 to 5 s ahead of what is missing are below usual ones; some seconds."""
-        return self.verdict == "unknown" and small(self)
+    def sufficient(self) -> Fit | None:
+        """Baseline whose errors 0.5 to 5 s ahead are below usual ones, if it is unknown why."""
+        return sufficient_baseline(self)
 
     @cached_property
     def predicting(self) -> Predicting | None:

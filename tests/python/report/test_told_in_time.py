@@ -27,7 +27,7 @@ def test_what_no_time_was_left_for_is_said(
             patch.setattr(study_module, slow, lambda *_, **__: pytest.fail("no time was left"))
         cut = replace(ended_at_once(study)).in_time(1e-9)
     assert set(cut.left_out) == {
-        *("shares", "predicting", "disagreements", "between_logs", "small", "where"),
+        *("shares", "predicting", "disagreements", "between_logs", "sufficient", "where"),
         *("unknown", "late", "causes", "errors_with", "hidden"),
     }
     said = "o time was left to find out how much of the errors ahead could be explained; what a fit"
@@ -44,7 +44,7 @@ def test_what_no_time_was_left_for_is_said(
     # Printing alone does not need what reports tell, and more time tells the rest.
     printed = cut.in_time(1e-9, reported=False)
     assert set(cut.left_out) - set(printed.left_out) == {"causes", "errors_with", "hidden"}
-    assert "small" not in cut.in_time(1e4).left_out
+    assert "sufficient" not in cut.in_time(1e4).left_out
     whole = replace(study).in_time(1e4)
     assert whole.left_out == study.left_out == {}
     assert str(whole) == str(study)

@@ -50,7 +50,7 @@ _PARTS = {
     "predicting": _Part("what a fit to predictions gains", lambda _: None),
     "disagreements": _Part("which parameters validation data give differently", lambda _: ()),
     "between_logs": _Part("which parameters training logs give differently", lambda _: []),
-    "small": _Part("whether the errors of the baseline matter", lambda _: False),
+    "sufficient": _Part("whether the errors of the baseline matter", lambda _: None),
     "where": _Part("moments at which the car changed, and delays", _without_causes),
     "unknown": _Part("the shape of what is missing", lambda _: None),
     "late": _Part("the delay of the car without the lags of the model", lambda _: {}),

@@ -164,12 +164,13 @@ def _of_the_search(study: Study) -> list[str]:
         found.append(f"raise the time limit: {few(study.stopped)} {was} not tried")
     elif TOGETHER in study.late_facts:
         found.append("raise the time limit: effects that hold only together were not all tried")
-    if study.verdict == "unknown" and study.small:
+    if study.sufficient is not None:
+        as_fitted = study.sufficient is study.fits[0]
+        how = "as it is" if as_fitted else "fitted to predictions (`study.sufficient`)"
         usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
         found.append(
             f"if errors 0.5 to 5 s ahead of less than {usual} do not matter to you, use the "
-            "baseline as it is: with `matters`, or `--matters`, the verdict counts only larger "
-            "ones"
+            f"baseline {how}: with `matters`, or `--matters`, the verdict counts only larger ones"
         )
     if slow(study):
         found.append(

@@ -20,7 +20,7 @@ from .widened import times_wider
 
 if TYPE_CHECKING:
     from ...effects import Parameter
-    from ...identify import Estimate
+    from ...identify import Estimate, Fit
     from ..study import Study
 
 
@@ -55,9 +55,14 @@ def events(study: Study) -> list[str]:
     return [c.event.of(data) for c, data in told if c.event is not None]
 
 
-def small(study: Study) -> bool:
-    """Whether the baseline's errors 0.5 to 5 s ahead can all be within the usual sizes."""
-    return sufficient(study.fits[0], study.validation, sizes_that_matter({})) is not None
+def sufficient_baseline(study: Study) -> Fit | None:
+    """The baseline whose errors 0.5 to 5 s ahead are within the usual sizes, if it is unknown why.
+
+    As it was fitted, or with its parameters fitted to predictions; None where neither is.
+    """
+    if study.verdict != "unknown":
+        return None
+    return sufficient(study.fits[0], study.validation, sizes_that_matter({}))
 
 
 def nuisances(study: Study) -> list[str]:
