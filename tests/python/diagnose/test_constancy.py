@@ -12,6 +12,7 @@ from sysid_vehicle.diagnose.candidates.score import _p_value
 from sysid_vehicle.identify import refine
 
 ROLLING = "rolling_resistance.coefficient"
+RATIO = "steer_ratio.ratio_error"
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +61,17 @@ def test_a_proxy_changes_from_drive_to_drive(fits: dict[str, Fit]) -> None:
     assert judged.finding == "proxy"
     assert "its value is not constant (speed_mps from " in judged.sentence
     assert judged.sentence.endswith("m/s)")
+
+
+def test_noise_of_the_steering_is_no_other_value(truth: Model) -> None:
+    """On a motorway little but noise moves the wheels, and asks for no steering at all."""
+    car = truth.add("steer_ratio").with_values({RATIO: 0.16})
+    rng = np.random.default_rng(1)
+    roads = [manoeuvres.usual_road(kind, 50.0, rng) for kind in ("motorway", "country")]
+    logs = [drive(car, road, seed=1 + i, rate_hz=50.0) for i, road in enumerate(roads)]
+    kept = constancy(identify(truth.add("steer_ratio"), logs, starts=1))["steer_ratio"]
+    assert kept.holds
+    assert kept.p_value > 0.01
 
 
 def test_with_an_effect_its_rivals_are_doubted() -> None:

@@ -20,7 +20,9 @@ from ...effects import Effect
 from ...estimate import Driving
 from ...identify import Fit
 from ...rules import USUAL, Rules
-from ..evidence.evidence import Evidence
+from ..evidence.directions import Directions
+from ..evidence.evidence import Evidence, Section
+from ..evidence.input_noise import added_by_input_noise
 from ..evidence.projection import pseudo_inverse, variance_ratio
 
 _PIECE_S = 10.0
@@ -91,15 +93,45 @@ def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:
     evidence = Evidence(fit, fit.driving)
     names = list(fit.model.free_names)
     return {
-        part.id: _of_effect(
-            part,
-            evidence,
-            evidence.fitted[:, [names.index(n) for n in part.named]],
-            pieces,
-            rules,
-        )
+        part.id: _of_effect(part, evidence, [names.index(n) for n in part.named], pieces, rules)
         for part in parts
     }
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """Sensitivities to some of the fitted parameters, in each piece of the driving by themselves.
+
+    Attributes
+    ----------
+    own : list of int
+        Which columns.
+    pieces : list of array
+        Masks over the residuals.
+    """
+
+    own: list[int]
+    pieces: list[FloatArray]
+
+    @property
+    def width(self) -> int:
+        return len(self.own) * len(self.pieces)
+
+    @property
+    def groups(self) -> tuple[slice, ...]:
+        return ()
+
+    def asks(self, projected: Directions) -> None:
+        """Nothing: the colour is asked for along the whole solution."""
+
+    def of_all(self, fitted: FloatArray, first: int = 0) -> FloatArray:
+        """Columns of sensitivities to all parameters, which begin with some residual."""
+        own = fitted[:, self.own]
+        rows = slice(first, first + len(own))
+        return np.hstack([own * piece[rows, None] for piece in self.pieces])
+
+    def of(self, section: Section) -> FloatArray:
+        return self.of_all(section.fitted, _core.CHANNELS * section.where.start)
 
 
 def _as_felt(effect: Effect, fit: Fit) -> Effect:
@@ -120,23 +152,27 @@ def _pieces(driving: Driving) -> list[FloatArray]:
 def _of_effect(
     effect: Effect,
     evidence: Evidence,
-    own: FloatArray,
+    own: list[int],
     pieces: list[FloatArray],
     rules: Rules,
 ) -> Constancy:
     fit, e = evidence.fit, evidence.left
     whole = np.array([fit[n].value - q.null_value for n, q in effect.named.items()])
     # The pieces add up to the whole, which is fitted: the last one says nothing of its own.
-    cut = np.hstack([own * piece[:, None] for piece in pieces])
-    R = evidence.project(cut)
+    cut = _Cut(own, pieces)
+    R = evidence.project(cut.of_all(evidence.fitted))
     information = R.T @ R
     inverse, rank = pseudo_inverse(information)
     S = R.T @ e
     off = inverse @ S
     along = R @ off
     ratio = variance_ratio(along, e - along)
+    if scipy.stats.chi2.sf(float(S @ off) / ratio, rank) <= rules.level:
+        # The less an input moves in a piece, the more its noise is of what the piece tells.
+        S = S - added_by_input_noise(evidence, cut, lambda *_: cut)
+        off = inverse @ S
     statistic = float(S @ off) / ratio
-    width = own.shape[1]
+    width = len(own)
     by_piece = off.reshape(len(pieces), width)
     # What each piece tells beside all else. Of two pieces either tells their difference as well,
     # though one may hold nearly all that the effect does.
