@@ -1,5 +1,7 @@
 """What a search does not make simpler, as nobody asks for it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, mano
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import far_below, refine
 from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study.search import search
 from sysid_vehicle.study.search.steps import first_that_holds, without_insignificant
 
 
@@ -74,3 +77,31 @@ def test_what_is_needed_is_not_searched_to_the_end_without_it(
     poorer = refining(fit.model.drop("aero_drag"), fit.driving, None, least=told[0])
     assert far_below(poorer.log_likelihood, told[0])
     assert not poorer.converged
+
+
+def test_what_is_needless_beside_its_noise_goes(
+    baseline: Fit, driving: tuple[Driving, Driving], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the noise held a standard error may be half of that beside it, or less."""
+    beside = identify(baseline.model.add("steer_offset"), driving[0], starts=1)
+    held = replace(
+        beside,
+        estimates=tuple(
+            replace(e, std=0.01 * e.std) if e.name.startswith("steer_offset") else e
+            for e in beside.estimates
+        ),
+    )
+    assert without_insignificant(held, USUAL) is held
+    monkeypatch.setattr(search, "beside_noise", lambda fit: beside if fit is held else fit)
+    looks = search.Search(
+        driving[1],
+        candidates=[],
+        most_effects=4,
+        ends=np.inf,
+        rules=USUAL,
+        seed=0,
+        progress=False,
+        say=lambda _: None,
+    )
+    assert looks.lean(held).model.effects == ()
+    assert replace(looks, ends=0.0).lean(held) is beside

@@ -33,6 +33,7 @@ from .steps import (
     in_common,
     lead,
     likeliest,
+    without_insignificant,
 )
 from .together import first_together, in_place_of
 from .trail import Trail, step_in_words
@@ -112,6 +113,7 @@ class Search:
                 rules=self.rules,
                 ends=self.ends,
             )
+            found = self.lean(found)
             effects = set(found.model.effects)
             # One more than allowed may make another needless.
             if len(effects) > self.most_effects:
@@ -120,7 +122,7 @@ class Search:
             if any(set(f.model.effects) == effects for f in trail.fits):
                 return
             known = set(trail.fit.model.effects)
-            trail.fits.append(beside_noise(found))
+            trail.fits.append(found)
             self.say(step_in_words(found, known))
 
     def _that_hold(
@@ -182,6 +184,15 @@ class Search:
         if found is not fit and lead(found, fit, self.test) > 0.0:
             trail.fits[-1] = beside_noise(found)
             trail.diagnoses[-1] = self._diagnosis(trail.fit, (), refits=0)
+
+    def lean(self, fit: Fit) -> Fit:
+        """The fit with standard errors beside its noise, and without what these show needless.
+
+        With the noise held they may be half as large.
+        """
+        beside = beside_noise(fit)
+        found = before(self.ends, partial(without_insignificant, beside, self.rules), beside)
+        return found if found is beside else beside_noise(found)
 
     def _without(self, fit: Fit, name: str) -> Fit | None:
         try:
