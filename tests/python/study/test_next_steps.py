@@ -179,18 +179,11 @@ def test_drives_of_one_car_agree(adequate: Study, truth: Model) -> None:
 
 
 def test_offsets_that_differ_from_log_to_log_are_no_disagreement(truth: Model) -> None:
-    biased = truth.add("accelerometer_bias")
-    logs = [
-        drive(
-            biased.with_values({"accelerometer_bias.ay_mps2": bias}),
-            manoeuvres.lap(20.0),
-            seed=69,
-            rate_hz=50.0,
-        )
-        for bias in (0.25, -0.25)
-    ]
+    name, biased = "accelerometer_bias.ay_mps2", truth.add("accelerometer_bias")
+    cars = (biased.with_values({name: bias}) for bias in (0.25, -0.25))
+    logs = [drive(car, manoeuvres.lap(20.0), seed=69, rate_hz=50.0) for car in cars]
     fit = identify(truth.with_nuisances(), logs[0], starts=1)
-    assert fit["accelerometer_bias.ay_mps2"].value > 0.2
+    assert fit[name].value > 0.2
     assert disagreements(fit, Driving.of(logs[1])) == ()
 
 
