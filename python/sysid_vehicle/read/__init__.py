@@ -20,7 +20,7 @@ from .mapping.proposal import Proposal
 from .mapping.propose import propose_channels
 from .mapping.source import Source
 from .recording import Recording
-from .registry import FORMATS, Format, blamed, located, read_with, recognised
+from .registry import FORMATS, Format, located, read_with, recognised
 from .table import Table
 
 __all__ = [
@@ -99,7 +99,7 @@ def read_log(
     entry = None if path is None else recognised(path)
     where = run if path is None else str(path)
     notes: list[str] = []
-    with located(where), blamed(entry, where):
+    with located(where, entry=entry):
         table = contents(source, dbc, entry)
         if isinstance(table, Recording):
             table = mapping.rows_of(table, notes)

@@ -195,33 +195,30 @@ def read_with(entry: Format, path: Path, dbc: Path | None) -> Table | Recording:
 
 
 @contextmanager
-def blamed(entry: Format | None, path: object) -> Iterator[None]:
-    """Whatever a library raises at a broken file becomes one sentence of what the file is."""
+def located(where: str, run: str | None = None, entry: Format | None = None) -> Iterator[None]:
+    """Whatever is refused inside the block names the file, in place of the name of the run.
+
+    What a library raises at a broken file of the format `entry` is one sentence of what it is.
+    """
+    inside = f"{where}{os.sep}"  # of a file of a folder
     try:
         yield
-    except (InvalidInput, MemoryError):
+    except InvalidInput as error:
+        told = str(error)
+        if told.startswith((f"{where}: ", inside)):
+            raise
+        told = told if run is None else told.removeprefix(f"{run}: ")
+        raise InvalidInput(f"{where}: {told}") from error
+    except MemoryError:
         raise
     except Exception as error:
         if entry is None:
             raise
         reader = f"{entry.libraries[0]} cannot read it" if entry.libraries else "it is broken"
-        told = str(error).replace(f"{path}{os.sep}", "")  # files of a folder that is named already
+        told = str(error).replace(inside, "")
         raise InvalidInput(
-            f"{path}: is {entry.what}, but {reader} ({type(error).__name__}: {told}); {entry.mend}"
+            f"{where}: is {entry.what}, but {reader} ({type(error).__name__}: {told}); {entry.mend}"
         ) from error
-
-
-@contextmanager
-def located(where: str, run: str | None = None) -> Iterator[None]:
-    """Whatever is refused inside the block names the file, in place of the name of the run."""
-    try:
-        yield
-    except InvalidInput as error:
-        told = str(error)
-        if told.startswith((f"{where}: ", f"{where}{os.sep}")):  # also of a file of a folder
-            raise
-        told = told if run is None else told.removeprefix(f"{run}: ")
-        raise InvalidInput(f"{where}: {told}") from error
 
 
 def require(entry: Format, who: str) -> None:

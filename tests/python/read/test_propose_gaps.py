@@ -95,3 +95,10 @@ def test_times_that_go_back_hide_no_steering_wheel(
     steer = sv.propose_channels(columns, vehicle=CAR).channels["steer_rad"]
     assert "angle of the steering wheel" in steer.why
     assert 10.0 < np.radians(1.0) / steer.factor < 23.0  # half a lap tells it to a third
+
+
+def test_a_log_of_a_moment_has_a_map(driven: dict[str, np.ndarray]) -> None:
+    """A mean of nothing was warned of by numpy."""
+    begin = {name: values[driven["time"] < 0.35] for name, values in driven.items()}
+    found = sv.propose_channels(begin, vehicle=CAR).channels
+    assert {c: found[c].column for c in ("vx_mps", "vy_mps")} == {"vx_mps": "vx", "vy_mps": "vy"}

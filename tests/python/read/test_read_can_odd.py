@@ -147,12 +147,46 @@ def test_candump_without_a_clock_is_refused(
         read_log(path, MAP, dbc=dbc, check=False)
 
 
-def test_a_recording_that_was_cut_off(tmp_path: Path, dbc: Path, frames: Frames) -> None:
-    path = written(tmp_path / "run.log", frames)
-    path.write_bytes(path.read_bytes()[:-4])
-    with pytest.warns(SysidWarning, match=r"1 lines hold no whole frame, first line 480"):
-        log = read_log(path, SI, dbc=dbc, check=False)
-    assert log.n == 399
+@pytest.mark.parametrize("suffix", ["asc", "csv", "log", "trc"])
+def test_a_recording_that_was_cut_off(
+    tmp_path: Path,
+    dbc: Path,
+    frames: Frames,
+    suffix: str,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """At whatever byte of its last line, all before it is read; half a frame gives no value."""
+    path = written(tmp_path / f"run.{suffix}", frames)
+    raw = path.read_bytes()
+    whole = raw[: raw.index(b"\n", len(raw) // 2) + 1]
+    number = whole.count(b"\n") + 1
+    cut = raw[len(whole) : raw.index(b"\n", len(whole))].rstrip()
+    path.write_bytes(whole)
+    before = read_log(path, SI, dbc=dbc, check=False)
+    first = next(k for k, byte in enumerate(cut) if chr(byte).isdigit()) + 1
+    for length in range(first, len(cut) + 1, 3):
+        path.write_bytes(whole + cut[:length])
+        told = rf"run\.{suffix} breaks off in line {number}, which was left out"
+        with pytest.warns(SysidWarning, match=told) as caught:
+            log = read_log(path, SI, dbc=dbc, check=False)
+        assert not any("database" in str(w.message) for w in caught)
+        for channel in before.channels:
+            np.testing.assert_array_equal(log[channel], before[channel])
+    assert capfd.readouterr().err == ""  # python-can has words of its own for half a line
+
+
+@pytest.mark.parametrize("suffix", ["asc", "blf", "csv"])
+def test_a_log_without_frames(tmp_path: Path, dbc: Path, suffix: str) -> None:
+    """No other database would help."""
+    path = written(tmp_path / f"run.{suffix}", [])
+    with pytest.raises(InvalidInput, match=r"holds no frame of data; check that it was recorded"):
+        read_log(path, MAP, dbc=dbc)
+
+
+def test_a_database_that_is_not_there(tmp_path: Path, frames: Frames) -> None:
+    path = written(tmp_path / "run.blf", frames)
+    with pytest.raises(InvalidInput, match=r"cra\.dbc: cannot be read \(No such file.*the path"):
+        read_log(path, MAP, dbc=tmp_path / "cra.dbc")
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,20 @@ def test_text_below_the_numbers(tmp_path: Path, below: list[str]) -> None:
     check_values(log, slow=(), atol=1e-8)
 
 
+@pytest.mark.parametrize("about", [[], [["Logger 7"], ["Road", "dry"]]], ids=["bare", "about"])
+@pytest.mark.parametrize("mark", [",", ";", "\t", "  "])
+@pytest.mark.parametrize("ends", ["0.05", "0.05{mark}1", "End of data\n"])
+def test_what_is_below_the_numbers_hides_no_names(
+    tmp_path: Path, about: list[list[str]], mark: str, ends: str
+) -> None:
+    """Neither a row that breaks off nor text there: the names were sought in the first line."""
+    path = written(tmp_path, *about, NAMES, *cells(), mark=mark)
+    path.write_text(path.read_text() + ends.format(mark=mark))
+    with pytest.warns(SysidWarning, match=r"line \d+, the last, has only [1-3] cells and was left"):
+        log = read_log(path, TIMED, check=False)
+    check_values(log, slow=(), atol=1e-8)
+
+
 def test_signals_of_one_name_are_told_by_their_sensors(tmp_path: Path) -> None:
     """As tables with two levels of names are written; an empty cell repeats the one before."""
     names = ["Time", "z", "x", "y", "Steer", "Speed", "x"]

@@ -165,3 +165,56 @@ def test_two_publishers_of_a_topic(tmp_path: Path, later_ns: int) -> None:
         read_log(tmp_path / "run.mcap", MAP, check=False)
     told = " ".join(str(warning.message) for warning in caught)
     assert ("/imu: 2 publishers send it at the same time" in told) is (later_ns < 10**9)
+
+
+def test_single_messages_that_are_broken(tmp_path: Path) -> None:
+    """They are left out, told by topic, and the rest is read; no tool for files mends them."""
+    path = tmp_path / "run.mcap"
+    held = messages()
+    imu = [k for k, (topic, _, _) in enumerate(held) if topic == "/imu"]
+    held[imu[200]][2]["y"] = "overload"
+    with path.open("wb") as file:
+        writer = writers.Writer(file)
+        writer.start()
+        schema = writer.register_schema("any", "jsonschema", b"{}")
+        channels = {t: writer.register_channel(t, "json", schema) for t in LATE_NS}
+        for k, (topic, ns, message) in enumerate(held):
+            text = json.dumps(message).encode()
+            writer.add_message(channels[topic], ns, text[:30] if k in imu[100:103] else text, ns)
+        writer.finish()
+    with pytest.warns(SysidWarning) as caught:
+        log = read_log(path, MAP, check=False)
+    told = [str(w.message) for w in caught]
+    assert any("/imu: 3 messages cannot be decoded and were left out (JSONDec" in t for t in told)
+    assert any(
+        "/imu/y: 1 messages have text in place of a number, first 'overload'" in t for t in told
+    )
+    known = np.isfinite(log["ay_mps2"])
+    assert np.count_nonzero(known) == FAST.size - 4
+    np.testing.assert_array_equal(log["ay_mps2"][known], 2.0)
+
+
+def test_a_bag_whose_mcap_breaks_off(tmp_path: Path) -> None:
+    """The file in it is read as far as it is whole; nothing of bags mends it."""
+    rosbag2: Any = pytest.importorskip("rosbags.rosbag2")
+    types: Any = pytest.importorskip("rosbags.typesys")
+    store, kind = types.get_typestore(types.Stores.LATEST), "geometry_msgs/msg/Vector3"
+    folder = tmp_path / "run"
+    with rosbag2.Writer(folder, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+        place = writer.add_connection("/car", kind, typestore=store)
+        for t in FAST:
+            held = store.types[kind](x=20.0 + t, y=2.0, z=0.1)
+            writer.write(place, round(t * 1e9), store.serialize_cdr(held, kind))
+    part = folder / "run.mcap"
+    part.write_bytes(part.read_bytes()[:-200])
+    with pytest.raises(
+        InvalidInput, match=r"give read_log its file .*run\.mcap, .*mcap recover"
+    ) as e:
+        read_log(folder, MAP)
+    assert "sqlite" not in str(e.value)
+    names = {c: f"/car/{a}" for c, a in zip(("vx_mps", "ay_mps2", "steer_rad"), "xyz", strict=True)}
+    names |= {"yaw_rate_radps": "/car/z", "ax_mps2": "/car/z"}
+    with pytest.warns(SysidWarning) as caught:
+        log = read_log(part, names, check=False)
+    assert any("run.mcap: was not finished; the mess" in str(w.message) for w in caught)
+    np.testing.assert_allclose(log["vx_mps"], 20.0 + log["time_s"], atol=1e-9)

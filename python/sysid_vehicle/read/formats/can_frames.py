@@ -62,12 +62,24 @@ def frames_of(path: Path, notes: list[str]) -> Iterator[Frame]:
                     f"{reader.file_size} bytes that it states; what is there was read"
                 )
         return
-    text = read_text_table(path)
+    text = _whole_lines(path, read_text_table(path), notes)
     first = next((line.strip() for line in text.splitlines() if line.strip()), "")
     if _LOGGED.fullmatch(first) or _PRINTED.fullmatch(first):
         yield from _of_candump(path, text, notes)
     else:
         yield from _of_text(text)
+
+
+def _whole_lines(path: Path, text: str, notes: list[str]) -> str:
+    """Leave out a last line without an end: half a frame may read as a whole one."""
+    last = text[text.rfind("\n") + 1 :]
+    if not any(character.isdigit() for character in last):  # nothing, or the end of a block
+        return text
+    notes.append(
+        f"{path.name} breaks off in line {text.count(chr(10)) + 1}, which was left out: check that "
+        f"the recording was not cut off"
+    )
+    return text[: len(text) - len(last)]
 
 
 def _of_text(text: str) -> Iterator[Frame]:

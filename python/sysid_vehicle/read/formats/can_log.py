@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..._common.files import read_bytes
 from ...errors import InvalidInput
 from ..recording import Entry, LeftOut, Recording, Signal
 from .can_frames import Frame, frames_of
@@ -45,11 +46,16 @@ def read(path: Path, dbc: Path | None) -> Recording:
     messages = _database(dbc)
     frames = Counter(_source(frame) for frame in frames_of(path, []))
     known = _known(messages, frames)
+    if not frames:
+        raise InvalidInput(
+            f"{path}: holds no frame of data; check that it was recorded on the bus of the car, or "
+            f"record it again"
+        )
     if not known:
         first = ", ".join(hexadecimal(key) for (_, key), _ in frames.most_common(5))
         raise InvalidInput(
-            f"{path}: none of its {len(frames)} kinds of frames ({first or 'there are none'}, ...) "
-            f"is in {dbc.name}; give the database of this bus"
+            f"{path}: none of its {len(frames)} kinds of frames ({first}, ...) is in {dbc.name}; "
+            f"give the database of this bus"
         )
     entries, places = {}, {}
     for source, name in _names(known).items():
@@ -161,6 +167,7 @@ def _decoded(message: Any, frame: Frame) -> dict[str, Any] | None:
 def _database(dbc: Path) -> list[Any]:
     import cantools
 
+    read_bytes(dbc, 1)  # one that is not there is no broken database
     try:
         return list(cantools.database.load_file(dbc).messages)
     except Exception as error:

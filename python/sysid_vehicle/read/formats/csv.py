@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ _DIGITS = re.compile(r"\W{0,2}\d[\d.,' ]*([eEdD][+-]?\d+)?\W?")
 _MISSING = {"na", "n/a", "#n/a", "#na", "#nv", "null", "none", "nil", "-", "--", "---",
             "1.#qnan", "-1.#ind", "1.#ind"}  # fmt: skip
 _LAST_ROWS = 20  # that tell how many cells a row has
+_MOST_BELOW = 3  # lines below them: one that breaks off, or text
 _FEWEST_CELLS = 3
 _LONGEST_PREAMBLE = 100
 _MOST_LINES_OF_TEXT = 5  # below the first one: sensors, descriptions, units, types
@@ -93,9 +95,8 @@ def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
 def _blanks_as_tabs(text: str) -> str:
     """Return text whose cells are numbers with blanks between them with tabs in their place."""
     lines = text.split("\n")
-    last = [line for line in lines[-_LAST_ROWS:] if line.strip()]
-    widths = {len(line.split()) for line in last}
-    if len(widths) != 1 or min(widths) < _FEWEST_CELLS:
+    last = _even_rows(lines, str.split)
+    if not last:
         return text
     if any(mark in line for line in last for mark in _DELIMITERS):
         return text
@@ -159,14 +160,13 @@ def _preamble(lines: list[str]) -> int:
 
     The names have as many cells as the rows at the end of the file, and are no numbers.
     """
-    last = [line for line in lines[-_LAST_ROWS:] if line.strip()]
-    if len(lines) < 2 * _LAST_ROWS or not last:
+    if len(lines) < 2 * _LAST_ROWS:
         return 0
     for delimiter in ";\t|,":  # a comma between others is one of decimals
-        widths = {len(_cells(line, delimiter)) for line in last}
-        width = min(widths)
-        if len(widths) > 1 or width < _FEWEST_CELLS:
+        last = _even_rows(lines, partial(_cells, delimiter=delimiter))
+        if not last:
             continue
+        width = len(_cells(last[0], delimiter))
         for k, line in enumerate(lines[:_LONGEST_PREAMBLE]):
             named = _cells(line, delimiter)
             filled = sum(bool(cell.strip()) for cell in named)
@@ -175,6 +175,16 @@ def _preamble(lines: list[str]) -> int:
                 sensors = len(above) == width and any(above) and len({*named}) < width
                 return k - 1 if sensors else k
     return 0
+
+
+def _even_rows(lines: list[str], cells: Callable[[str], list[str]]) -> list[str]:
+    """The last rows, all of one width; none where they have several, or too few cells."""
+    last = [line for line in lines[-_LAST_ROWS:] if line.strip()]
+    widths = [len(cells(line)) for line in last]
+    for end in range(len(last), max(len(last) - _MOST_BELOW, 1) - 1, -1):
+        if len({*widths[:end]}) == 1 and widths[0] >= _FEWEST_CELLS:
+            return last[:end]
+    return []
 
 
 def _cells(line: str, delimiter: str) -> list[str]:

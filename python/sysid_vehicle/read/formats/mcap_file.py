@@ -60,11 +60,21 @@ def read(path: Path, dbc: Path | None) -> Recording:
             for held in islice(_by_index(path, [topic]), 1):
                 take(*held)
 
+    refused: dict[str, list[str]] = {}
+
     def messages(topics: list[str]) -> Iterator[Taken]:
+        refused.clear()
         held = _by_index(path, topics) if indexed is not None else _from_beginning(path, topics)[0]
         for schema, channel, message in held:
-            if (decode := decoder(schema, channel)) is not None:
-                yield channel.topic, decode(message.data), message.log_time, channel.id
+            if (decode := decoder(schema, channel)) is None:
+                continue
+            try:
+                decoded = decode(message.data)
+            except Exception as error:  # of whatever library: the other messages are read
+                told = f"{type(error).__name__}: {error}"[:_LONGEST]
+                refused.setdefault(channel.topic, []).append(told)
+                continue
+            yield channel.topic, decoded, message.log_time, channel.id
 
     left = _left_out(unread)
     recording = recording_of(firsts.items(), messages, left)
@@ -75,15 +85,21 @@ def read(path: Path, dbc: Path | None) -> Recording:
             f"{path}: is an MCAP file, but holds no whole message with numbers; mend it with mcap "
             f"recover, or record it again"
         )
-    if indexed is not None or not _from_beginning(path, [])[1]:
-        return recording
+    unfinished = indexed is None and _from_beginning(path, [])[1]
 
     def fetch(names: list[str], notes: list[str]) -> dict[str, Signal]:
-        notes.append(
-            f"{path.name}: was not finished; the messages that are whole were read: mend it with "
-            f"mcap recover to keep the end"
-        )
-        return dict(recording.fetch(names, notes))
+        if unfinished:
+            notes.append(
+                f"{path.name}: was not finished; the messages that are whole were read: mend it "
+                f"with mcap recover to keep the end"
+            )
+        signals = dict(recording.fetch(names, notes))
+        notes += [
+            f"{topic}: {len(told)} messages cannot be decoded and were left out ({told[0]}); check "
+            f"what sends them"
+            for topic, told in refused.items()
+        ]
+        return signals
 
     return replace(recording, fetch=fetch)
 

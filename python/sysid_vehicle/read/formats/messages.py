@@ -146,6 +146,7 @@ class Topic:
     recorded: list[int] = field(default_factory=list)
     values: dict[str, list[float]] = field(default_factory=dict)
     publishers: dict[int, tuple[int, int]] = field(default_factory=dict)  # first and last times
+    texts: dict[str, list[str]] = field(default_factory=dict)  # that stand in place of numbers
 
     def take(self, message: Any, recorded_ns: int, publisher: int) -> None:
         """Take one message."""
@@ -158,6 +159,9 @@ class Topic:
                 value = float(get(message))
             except (AttributeError, IndexError, KeyError, TypeError):
                 # An array may be shorter now, or a field unset.
+                value = np.nan
+            except ValueError:
+                self.texts.setdefault(path, []).append(str(get(message)))
                 value = np.nan
             self.values.setdefault(path, []).append(value)
 
@@ -216,6 +220,11 @@ def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]
                 f"{name}: {len(spans)} publishers send it at the same time, and their messages are "
                 f"mixed; record them under topics of their own"
             )
+        notes += [
+            f"{name}/{path}: {len(texts)} messages have text in place of a number, first "
+            f"'{texts[0]}'; they count as missing: check the sensor"
+            for path, texts in topic.texts.items()
+        ]
         recorded, stamps = np.array(topic.recorded), np.array(topic.stamps)
         stamped = stamps > 0
         if stamped.any() and not stamped.all():

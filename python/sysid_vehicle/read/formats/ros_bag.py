@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -58,10 +59,25 @@ def _messages(reader: Any, connections: list[Any]) -> Iterator[Taken]:
         yield connection.topic, message, recorded_ns, connection.id
 
 
-def _opened(path: Path) -> Any:
-    from rosbags.highlevel import AnyReader
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    from rosbags.highlevel import AnyReader, AnyReaderError
     from rosbags.typesys import Stores, get_typestore
 
     # A data file of a ROS 2 bag is read through the folder that describes it.
     folder = path.parent if path.suffix == ".db3" else path
-    return AnyReader([folder], default_typestore=get_typestore(Stores.LATEST))
+    reader = AnyReader([folder], default_typestore=get_typestore(Stores.LATEST))
+    try:
+        reader.open()
+    except AnyReaderError as error:
+        parts = sorted(folder.glob("*.mcap"))
+        if not parts:
+            raise
+        raise InvalidInput(
+            f"{path}: is a ROS bag, but rosbags cannot read it ({error}); give read_log its file "
+            f"{parts[-1]}, which is read as far as it is whole, or mend that with mcap recover"
+        ) from error
+    try:
+        yield reader
+    finally:
+        reader.close()

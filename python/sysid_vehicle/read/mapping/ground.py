@@ -257,6 +257,8 @@ def turns_of(
     turned = np.concatenate(([0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))))
     _, begins = np.unique(np.floor((t - t[0]) / _WINDOW_S), return_index=True)
     ticks = t[begins]
+    if ticks.size < 2:  # a log of a moment tells no turns
+        return np.nan
     step = np.diff(ticks)
     no_gap = step <= _GAP * np.median(step)
     fast = np.interp(ticks, time_s[moving], speed[moving]) > _slowest(speed[moving])

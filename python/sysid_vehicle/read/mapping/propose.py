@@ -14,7 +14,7 @@ from ...errors import warn
 from ...log import CHANNELS, COMMANDS, Columns, Log, standing
 from ...vehicle import Vehicle
 from ..recording import Recording
-from ..registry import blamed, located, recognised
+from ..registry import located, recognised
 from ..units import factor_to
 from .ground import PARTS
 from .look import Signal, View, by_name, ended, even, ranked, stated
@@ -79,7 +79,7 @@ def propose_channels(
     is_path = isinstance(source, (str, Path))
     entry = recognised(as_path(source)) if is_path else None
     where = str(as_path(source)) if is_path else "log"
-    with located(where), blamed(entry, where):
+    with located(where, entry=entry):
         held = contents(source, dbc, entry)
         for left in held.left_out if isinstance(held, Recording) else ():
             warn(f"{as_path(source).stem if is_path else 'log'}: {left}")
