@@ -299,7 +299,8 @@ class Driving:
     ) -> _core.Problem:
         """The core's problem whose runs are windows, each from a motion that is given.
 
-        Whoever drives answers the slopes to come: where the road has some, windows know them.
+        Whoever drives answers the grades to come: where the road has some, windows know them. A
+        crossfall they do not know: what a model errs sideways looks like one to its smoother.
 
         Parameters
         ----------
@@ -309,11 +310,11 @@ class Driving:
             Smoothed means, as a problem gives them: v_x, v_y [m/s] and yaw rate [rad/s], with which
             the windows begin, are the first, gravity along and across [m/s2] the last of them.
         """
-        slope = told[:, -2:]
-        slopes = np.isfinite(slope).all() and slope.any()
+        along = told[:, -2]
         core, inputs = model.core(force_known=self.force_known), self._whole_inputs
-        if slopes:
-            core, inputs = core.on_known_slopes(), np.hstack([inputs, slope])
+        if np.isfinite(along).all() and along.any():
+            slope = (along, np.zeros(len(along)))
+            core, inputs = core.on_known_slopes(), np.column_stack([inputs, *slope])
         parts = [
             part for first, size in windows for part in between(self._whole, first, first + size)
         ]

@@ -90,8 +90,9 @@ def test_a_driver_who_answers_slopes_hides_no_force() -> None:
     one_step = identify(car, log, starts=1)
     found = predicting_ahead(one_step, 5.0)[name]
     assert found.value == pytest.approx(0.2, abs=min(0.03, 3.0 * found.std))
-    # What slopes are smoothed with is known no better than that.
-    assert one_step[name].std < found.std < 2.0 * one_step[name].std
+    # What grades are smoothed with is known no better than that; a crossfall, of which windows do
+    # not know, is noise to them.
+    assert one_step[name].std < found.std < 0.02
 
 
 def test_a_car_of_another_simulator_is_predicted_better(shared_data: Path, repo: Path) -> None:

@@ -47,13 +47,14 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     """Fit the free parameters to predictions over windows, from a fit of the likelihood.
 
     Each window begins with the smoothed motion, and from there on knows steering, wheel force, and
-    the smoothed slope of a road that is not level: drivers answer slopes, and of models that do
-    not know them one that answers less would err less. Errors count in standard deviations of
-    their channel over the driving, together with ten times the noise of its sensor: beside an
-    accelerometer that shakes other channels decide. Windows in which the model loses the car do
-    not count, a tenth at most. The search begins from the likelihood's parameters, and once more
-    with the tyres of the vehicle file. Standard errors are those of windows that are wrong alike
-    for ten seconds (sandwich of Huber and White over such blocks).
+    the smoothed grade of a road that is not level: drivers answer grades, and of models that do
+    not know them one that answers less would err less. A crossfall is not known: what a model errs
+    sideways looks like one to its smoother, and would not be fitted. Errors count in standard
+    deviations of their channel over the driving, together with ten times the noise of its sensor:
+    beside an accelerometer that shakes other channels decide. Windows in which the model loses the
+    car do not count, a tenth at most. The search begins from the likelihood's parameters, and once
+    more with the tyres of the vehicle file. Standard errors are those of windows that are wrong
+    alike for ten seconds (sandwich of Huber and White over such blocks).
 
     Parameters
     ----------
