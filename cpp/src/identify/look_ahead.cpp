@@ -59,7 +59,8 @@ class FilteredStates {
     std::vector<std::vector<double>> runs_;
 };
 
-/// Forces are not foreseen. The slope of the road is known, or fades from where it is known.
+/// Forces are not foreseen. The grade is known; the crossfall, and a grade that is not, fades from
+/// where it is known.
 class Predictions {
   public:
     Predictions(const Problem& problem, FilteredStates filtered, const double* p,
@@ -106,9 +107,9 @@ class Predictions {
     double begin(std::size_t k, std::size_t i) const {
         const double known = filtered_.at(number_, k)[i];
         if (i < model_.states()) return known;
-        if (i >= model_.states() + kPushes) return known;
-        const bool slope = i >= model_.states() + kMotionStates && !problem_.model.slope_known;
-        return slope ? known : 0.0;
+        const std::size_t external = i - model_.states();
+        if (external < kGravityX) return 0.0;
+        return external == kGravityX && problem_.model.slope_known ? 0.0 : known;
     }
 
     void together(const Run& run, const std::vector<std::size_t>& asked, const std::size_t* starts,
@@ -200,15 +201,16 @@ std::vector<double> smoothed_of(const Problem& logged, const double* p, const No
     return means;
 }
 
-/// Gravity as smoothed means tell it becomes known: nothing of the car foretells it.
-void tell_slope(Problem& problem, const std::vector<double>& means) {
+/// Gravity along as smoothed means tell it becomes known: nothing of the car foretells it, and
+/// drivers answer it. Across it does not: a smoother takes what a model errs sideways for a bank.
+void tell_grade(Problem& problem, const std::vector<double>& means) {
     problem.model.slope_known = true;
-    const double* slope = means.data() + kStatesFull;
+    const double* grade = means.data() + kStatesFull;
     for (Run& run : problem.runs)
         for (Input& u : run.inputs) {
-            u.gravity_x_mps2 = slope[0];
-            u.gravity_y_mps2 = slope[1];
-            slope += kStatesTold;
+            u.gravity_x_mps2 = *grade;
+            u.gravity_y_mps2 = 0.0;
+            grade += kStatesTold;
         }
 }
 
@@ -222,7 +224,7 @@ void look_ahead(const Problem& logged, const double* p, const Noise& noise,
     const InTime in_time(logged, p);
     Problem problem = *in_time;
     FilteredStates filtered(problem, p, noise);
-    if (!readings && noise.sloping()) tell_slope(problem, smoothed_of(logged, p, noise));
+    if (!readings && noise.sloping()) tell_grade(problem, smoothed_of(logged, p, noise));
     Predictions predictions(problem, std::move(filtered), p, noise, horizons, readings, errors);
     std::size_t offset = 0;
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {

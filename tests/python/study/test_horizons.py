@@ -111,14 +111,30 @@ def test_a_driver_who_answers_slopes_makes_the_true_car_err_no_more(
     )
     assert np.all((after < 1.01 * before)[:, [PREDICTED.index("vx_mps")]])
     assert np.all((after < before)[:, PREDICTED.index("ax_mps2")])
+    # Of what is ahead the grade alone is known: the crossfall moves a_y, and a little all else.
+    told = [i for i, c in enumerate(PREDICTED) if c != "ay_mps2" or not slope_rad]
     sensor = np.array([noise.reading[MEASURED.index(c)] for c in PREDICTED])
-    assert np.all(after < 1.5 * sensor)
+    assert np.all((after < 1.5 * sensor)[:, told])
     found = changes(without, right, driving, (1.0, 2.0, 5.0))
     assert {c.channel for c in found} == {*PREDICTED}
     assert worse(found) == ()
     own = own_share(without, right, driving, (1.0, 2.0), channels=moved_by(truth.parts[0]))
     # The speed counts too, whose error the slope takes up in part: less than on the level.
     assert own.low > (0.03 if slope_rad else 0.05)
+
+
+def test_no_prediction_knows_the_crossfall_to_come(fit: Fit, altered: Callable[..., Log]) -> None:
+    """A smoother takes what a model errs sideways for a bank, by which it would be predicted."""
+    road = RoadDisturbance(slope_rad=0.015)
+    course = usual_road("country", 40.0, 4)
+    log = drive(fit.model, course, seed=6, disturbance=road, rate_hz=50.0)
+    noise = replace(fit.noise, disturbance=(10.0,) * 3, road=(9.81 * 0.015,) * 2, road_time_s=5.0)
+    late = 1000
+    turned = log["yaw_rate_radps"] + 0.02 * (np.arange(len(log)) >= late)
+    drives = (Driving.of(log), Driving.of(altered(log, yaw_rate_radps=turned)))
+    told = [d.measured - look_ahead(fit, noise, d, 2.0) for d in drives]
+    moved = np.nanmax(np.abs(told[1] - told[0])[late : late + 100], axis=0)  # begun before
+    assert np.all(moved[[MEASURED.index(c) for c in LATERAL]] < 1e-3)
 
 
 def test_a_spin_does_not_decide(

@@ -45,7 +45,7 @@ def ahead(study: Study) -> str:
         return ""
     where = "where the car turns, on validation data"
     if study.fit.noise.sloping:
-        where += ", the slope of the road known"
+        where += ", the grade of the road known"
     return f"Median error {AHEAD_S:g} s ahead {where}: {', '.join(told)}."
 
 
