@@ -221,7 +221,7 @@ def test_what_no_name_stands_for_is_told_with_shares_and_a_drive(unknown: Study)
     names = "steer_lag and side_wind and steer_ratio"
     assert f"{names} together explain 80 % (60 to 90) of the error 1 to 5 s" in found.meaning
     assert "steer_lag explains 80 %" in replace(found, added=(lag,)).meaning
-    assert "its own share of the error 1 to 5 s ahead 30 % (-10 to 50) on validation" in str(lag)
+    assert "ahead, where it changes predictions: 30 % (-10 to 50) on validation" in str(lag)
     assert "own share" not in str(ratio)
     assert lag.to_dict()["own_share"]["low"] == -0.1
     said = next_steps(found)

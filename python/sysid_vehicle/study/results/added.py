@@ -113,7 +113,8 @@ class AddedEffect:
             return ""
         group = _both(self.together, self.together_in_training)
         others = f", that of the group {group}" if group else ""
-        return f"its own share of the error 1 to 5 s ahead {own}{others}"
+        of = "its own share of the error 1 to 5 s ahead, where it changes predictions"
+        return f"{of}: {own}{others}"
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
