@@ -1,10 +1,15 @@
 """What several tests of studies share."""
 
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import maximum
+from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study.search.search import Search
 
 
 @pytest.fixture
@@ -19,3 +24,22 @@ def settled_on(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     monkeypatch.setattr(maximum, "settle", counted)
     return asked
+
+
+@pytest.fixture(scope="session")
+def searching() -> Callable[..., Search]:
+    """Make a search that judges by some driving, without any limit of time, and says nothing."""
+
+    def make(test: Driving, **settings: Any) -> Search:
+        usual = {
+            "candidates": (),
+            "most_effects": 4,
+            "ends": np.inf,
+            "rules": USUAL,
+            "seed": 0,
+            "progress": False,
+            "say": lambda _: None,
+        }
+        return Search(test, **{**usual, **settings})
+
+    return make

@@ -1,14 +1,11 @@
 """Effects of which none holds alone."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study.search.search import Search
 from sysid_vehicle.study.search.steps import likeliest
 from sysid_vehicle.study.search.trail import Trail
@@ -23,24 +20,15 @@ def baseline(truth: Model, start: Model) -> Fit:
     return identify(start, drive(car, manoeuvres.lap(20.0), seed=61, rate_hz=50.0), starts=1)
 
 
-def looking_for_both(fit: Fit) -> Search:
-    return Search(
-        fit.driving,
-        candidates=BOTH,
-        most_effects=4,
-        ends=np.inf,
-        rules=USUAL,
-        seed=0,
-        progress=False,
-        say=lambda _: None,
-    )
-
-
 @pytest.mark.parametrize(
     ("confirmed_after", "better"), [(1, True), (2, True), (2, False), (None, True)]
 )
 def test_training_data_lead_on_until_validation_data_confirm_the_whole(
-    baseline: Fit, monkeypatch: pytest.MonkeyPatch, confirmed_after: int | None, better: bool
+    baseline: Fit,
+    monkeypatch: pytest.MonkeyPatch,
+    confirmed_after: int | None,
+    searching: Callable[..., Search],
+    better: bool,
 ) -> None:
     """Of two that are not even predicted better one step ahead no third one is sought."""
     asked: list[tuple[str, ...]] = []
@@ -58,7 +46,7 @@ def test_training_data_lead_on_until_validation_data_confirm_the_whole(
     monkeypatch.setattr(Search, "_diagnosis", diagnosis)
     monkeypatch.setattr("sysid_vehicle.study.search.search.first_that_holds", holds)
     monkeypatch.setattr("sysid_vehicle.study.search.search.foretold_better", lambda *_: better)
-    looking = looking_for_both(baseline)
+    looking = searching(baseline.driving, candidates=BOTH)
     trail = Trail([baseline])
     found = looking._beside_others(diagnose(baseline, candidates=BOTH), trail)
     assert set(asked[0]) < set(BOTH)
@@ -76,7 +64,10 @@ def test_training_data_lead_on_until_validation_data_confirm_the_whole(
 
 @pytest.mark.parametrize("late_in", ["first_that_holds", "_beside_others", None])
 def test_what_the_time_limit_left_untried_is_not_what_was_refused(
-    baseline: Fit, monkeypatch: pytest.MonkeyPatch, late_in: str | None
+    baseline: Fit,
+    monkeypatch: pytest.MonkeyPatch,
+    searching: Callable[..., Search],
+    late_in: str | None,
 ) -> None:
     """Effects that validation data refused in time are not said to be left untried."""
     dx, now = diagnose(baseline, candidates=BOTH), [0.0]
@@ -96,14 +87,17 @@ def test_what_the_time_limit_left_untried_is_not_what_was_refused(
     monkeypatch.setattr(f"{at}first_together", refusing("first_together"))
     monkeypatch.setattr(f"{at}with_unfollowed", lambda found, _: found)
     trail = Trail([baseline])
-    replace(looking_for_both(baseline), ends=1.0).follow(trail)
+    searching(baseline.driving, candidates=BOTH, ends=1.0).follow(trail)
     untried = {c.id for c in dx.significant} if late_in == "first_that_holds" else set()
     assert set(trail.stopped) == untried
     assert trail.unpaired is (late_in == "_beside_others")
 
 
 def test_what_fits_as_well_in_the_place_of_one_of_several_is_tried_there(
-    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
+    truth: Model,
+    start: Model,
+    searching: Callable[..., Search],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Subsets with either score alike, and one of them is refitted: that with a side wind."""
     car = truth.add("steer_offset").with_values({"steer_offset.offset_rad": 0.012})
@@ -119,7 +113,7 @@ def test_what_fits_as_well_in_the_place_of_one_of_several_is_tried_there(
     wind = [(("side_wind",), windy)]
     monkeypatch.setattr(f"{at}first_that_holds", lambda *_: None)
     monkeypatch.setattr(f"{at}first_together", lambda *_: wind.pop() if wind else None)
-    looking = replace(looking_for_both(baseline), candidates=both, test=Driving.of(test))
+    looking = searching(Driving.of(test), candidates=both)
     trail = Trail([baseline])
     looking.follow(trail)
     assert [f.model.effects for f in trail.fits] == [(), ("steer_offset",)]

@@ -1,5 +1,6 @@
 """What a search does not make simpler, as nobody asks for it."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import far_below, refine
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study.search import search
+from sysid_vehicle.study.search.search import Search
 from sysid_vehicle.study.search.steps import first_that_holds, without_insignificant
 
 
@@ -80,7 +82,10 @@ def test_what_is_needed_is_not_searched_to_the_end_without_it(
 
 
 def test_what_is_needless_beside_its_noise_goes(
-    baseline: Fit, driving: tuple[Driving, Driving], monkeypatch: pytest.MonkeyPatch
+    baseline: Fit,
+    driving: tuple[Driving, Driving],
+    searching: Callable[..., Search],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With the noise held a standard error may be half of that beside it, or less."""
     beside = identify(baseline.model.add("steer_offset"), driving[0], starts=1)
@@ -93,15 +98,6 @@ def test_what_is_needless_beside_its_noise_goes(
     )
     assert without_insignificant(held, USUAL) is held
     monkeypatch.setattr(search, "beside_noise", lambda fit: beside if fit is held else fit)
-    looks = search.Search(
-        driving[1],
-        candidates=[],
-        most_effects=4,
-        ends=np.inf,
-        rules=USUAL,
-        seed=0,
-        progress=False,
-        say=lambda _: None,
-    )
+    looks = searching(driving[1])
     assert looks.lean(held).model.effects == ()
     assert replace(looks, ends=0.0).lean(held) is beside

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from sysid_vehicle import Diagnosis, Effect, Fit, diagnose
@@ -15,19 +14,6 @@ from sysid_vehicle.study.search.search import Search
 from sysid_vehicle.study.search.trail import Trail
 
 AGAINST = ["aero_drag", "rolling_resistance", "head_wind"]
-
-
-def search(fit: Fit, most_effects: int) -> Search:
-    return Search(
-        fit.driving,
-        candidates=AGAINST,
-        most_effects=most_effects,
-        ends=np.inf,
-        rules=USUAL,
-        seed=0,
-        progress=False,
-        say=lambda _: None,
-    )
 
 
 def test_what_is_in_the_model_beside_an_effect_is_no_rival_of_it(
@@ -42,7 +28,9 @@ def test_what_is_in_the_model_beside_an_effect_is_no_rival_of_it(
 
 
 def test_what_refines_an_effect_is_a_candidate_beside_it(
-    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+    hidden_fit: Callable[[str, float], Fit],
+    searching: Callable[..., Search],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     fit = hidden_fit("body_attitude.roll_per_g_rad", 0.06)
     lean = refit(fit.model.add("body_attitude"), fit.driving, fit.noise)
@@ -53,14 +41,16 @@ def test_what_refines_an_effect_is_a_candidate_beside_it(
         return replace(diagnose(of, candidates=AGAINST, refits=0), ranking=())
 
     monkeypatch.setattr("sysid_vehicle.study.search.search.diagnose", noted)
-    one = replace(search(fit, 1), finer=refining())
+    one = searching(fit.driving, candidates=AGAINST, most_effects=1, finer=refining())
     one.follow(Trail([fit]))
     one.follow(Trail([fit, lean]))
     assert asked == [AGAINST, [*AGAINST, "body_roll"]]
 
 
 def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
-    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+    hidden_fit: Callable[[str, float], Fit],
+    searching: Callable[..., Search],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     fit = hidden_fit("aero_drag.drag_area_m2", 0.6)
     dx = diagnose(fit, candidates=AGAINST)
@@ -73,7 +63,7 @@ def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
 
     monkeypatch.setattr("sysid_vehicle.study.search.search.diagnose", noted)
     trail = Trail([fit])
-    search(fit, 1).follow(trail)
+    searching(fit.driving, candidates=AGAINST, most_effects=1).follow(trail)
     assert trail.fit is not fit
     assert asked == [set(), {c.id for c in dx.significant if c.finished}]
     assert len(asked[1]) > 1
@@ -100,7 +90,9 @@ def test_steps_with_which_the_model_errs_more_ahead_than_the_baseline_are_taken_
 
 
 def test_an_effect_with_which_errors_are_larger_where_it_acts_is_taken_out(
-    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+    hidden_fit: Callable[[str, float], Fit],
+    searching: Callable[..., Search],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     baseline = hidden_fit("aero_drag.drag_area_m2", 0.6)
     dx = diagnose(baseline, candidates=["aero_drag"])
@@ -122,7 +114,7 @@ def test_an_effect_with_which_errors_are_larger_where_it_acts_is_taken_out(
 
     def left(last: Diagnosis = dx) -> Trail:
         trail = Trail(list(fits), [replace(last, fit=f) for f in fits])
-        search(baseline, 2).take_out_harmful(trail)
+        searching(baseline.driving, candidates=AGAINST, most_effects=2).take_out_harmful(trail)
         return trail
 
     trail = left()

@@ -1,6 +1,8 @@
 """One step of the way: what stands in for others is exchanged, what is not needed is dropped."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
-from sysid_vehicle.rules import USUAL, share_explained
+from sysid_vehicle.rules import share_explained
 from sysid_vehicle.study.search.search import Search
 from sysid_vehicle.study.search.steps import (
     _distance,
@@ -100,8 +102,8 @@ def test_what_is_as_likely_by_its_price_need_not_be_significant(
 def test_a_slope_and_a_bias_give_way_to_rolling_resistance(start: Model, truth: Model) -> None:
     """Beside the slope the bias does to the last digit what rolling resistance does alone."""
     car = truth.add("rolling_resistance").with_values({"rolling_resistance.coefficient": 0.02})
-    driving = Driving.of(drive(car, manoeuvres.lap(30.0), seed=63, rate_hz=50.0))
-    test = Driving.of(drive(car, manoeuvres.handling_course(30.0), seed=64, rate_hz=50.0))
+    driving = Driving.of(drive(car, manoeuvres.lap(30.0), seed=163, rate_hz=50.0))
+    test = Driving.of(drive(car, manoeuvres.handling_course(30.0), seed=164, rate_hz=50.0))
     sloping = identify(start.add("road_grade"), driving, starts=1)
     dx = diagnose(sloping, candidates=["accelerometer_bias", "rolling_resistance"])
     bias, rolling = (by_id(dx, name) for name in ("accelerometer_bias", "rolling_resistance"))
@@ -188,40 +190,28 @@ def test_of_two_that_are_as_good_the_simpler_is_preferred(
     assert not better(simple, both, driving[1])
 
 
-def search(test: Driving, most_effects: int, told: list[str]) -> Search:
-    return Search(
-        test,
-        candidates=AGAINST,
-        most_effects=most_effects,
-        ends=np.inf,
-        rules=USUAL,
-        seed=0,
-        progress=False,
-        say=told.append,
-    )
-
-
 @pytest.mark.manual
 def test_no_more_effects_are_added_than_allowed(
-    baseline: Fit, driving: tuple[Driving, Driving]
+    baseline: Fit,
+    searching: Callable[..., Search],
+    driving: tuple[Driving, Driving],
 ) -> None:
-    told: list[str] = []
-
     def followed(way: Search) -> Trail:
         trail = Trail([baseline])
         way.follow(trail)
         return trail
 
-    none = followed(search(driving[1], 0, told))
+    looking = partial(searching, driving[1], candidates=AGAINST)
+    none = followed(looking(most_effects=0))
     assert none.fit is baseline
     assert len(none.diagnoses) == 1
-    late = followed(replace(search(driving[1], 6, told), ends=0.0))
+    late = followed(looking(most_effects=6, ends=0.0))
     assert late.fit is baseline
     assert len(late.diagnoses) == 1
     assert set(late.stopped) == {c.id for c in late.diagnoses[0].significant}
     assert late.stopped
     assert none.stopped == ()
-    one = followed(search(driving[1], 1, told))
+    one = followed(looking(most_effects=1))
     assert len(one.fit.model.effects) == 1
     assert one.diagnoses[-1].fit is one.fit
 
@@ -230,6 +220,7 @@ def test_what_was_refitted_when_the_time_is_over_is_added(
     dx: Diagnosis,
     baseline: Fit,
     driving: tuple[Driving, Driving],
+    searching: Callable[..., Search],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The diagnosis begins in time and ends late: no further refit, and no step is lost."""
@@ -239,7 +230,7 @@ def test_what_was_refitted_when_the_time_is_over_is_added(
     for refits in ("together._with_subset", "steps._with_others"):
         monkeypatch.setattr(f"sysid_vehicle.study.search.{refits}", pytest.fail)
     trail = Trail([baseline])
-    replace(search(driving[1], 4, []), ends=1.0).follow(trail)
+    searching(driving[1], candidates=AGAINST, ends=1.0).follow(trail)
     held = first_that_holds(dx, baseline, driving[1])
     assert held is not None
     assert [f.model.effects for f in trail.fits] == [(), held[1].model.effects]
@@ -328,7 +319,10 @@ def test_a_search_that_ends_at_its_bound_wanted_more_than_any_car_has() -> None:
 @pytest.mark.manual
 @pytest.mark.parametrize("downforce", [1.3, 0.0])
 def test_two_that_may_hold_only_together_are_sought_together(
-    truth: Model, start: Model, downforce: float
+    truth: Model,
+    start: Model,
+    searching: Callable[..., Search],
+    downforce: float,
 ) -> None:
     both = ["steer_lag", "aero_downforce"]
     values = {
@@ -347,7 +341,7 @@ def test_two_that_may_hold_only_together_are_sought_together(
     assert first is not None
     assert first.id == "steer_lag"
     trail = Trail([baseline])
-    looking = replace(search(test, 2, []), candidates=both)
+    looking = searching(test, candidates=both, most_effects=2)
     found = looking._beside_others(alone, trail)
     if downforce == 0.0:
         assert found is None
