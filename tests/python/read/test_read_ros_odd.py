@@ -106,7 +106,7 @@ def test_messages_without_a_stamp_among_others(tmp_path: Path) -> None:
     first = next(k for k, message in enumerate(held) if message[0] == "/speed")
     held[first] = (*held[first][:2], {"value": 99.0, **header(0, 0)})
     path = write(tmp_path / "run.mcap", held)
-    with pytest.warns(SysidWarning, match=r"/speed: 1 of 80 messages have no stamp, first .* 0,"):
+    with pytest.warns(SysidWarning, match=r"/speed: 1 of 80 messages without stamp, first .* 0,"):
         check(read_log(path, MAP, check=False), SLOW.size - 1)
 
 
@@ -185,9 +185,11 @@ def test_single_messages_that_are_broken(tmp_path: Path) -> None:
     with pytest.warns(SysidWarning) as caught:
         log = read_log(path, MAP, check=False)
     told = [str(w.message) for w in caught]
-    assert any("/imu: 3 messages cannot be decoded and were left out (JSONDec" in t for t in told)
     assert any(
-        "/imu/y: 1 messages have text in place of a number, first 'overload'" in t for t in told
+        "/imu: 3 message(s) that cannot be decoded were left out (JSONDec" in t for t in told
+    )
+    assert any(
+        "/imu/y: text in place of a number in 1 message(s), first 'overload'" in t for t in told
     )
     known = np.isfinite(log["ay_mps2"])
     assert np.count_nonzero(known) == FAST.size - 4

@@ -95,8 +95,8 @@ def read(path: Path, dbc: Path | None) -> Recording:
             )
         signals = dict(recording.fetch(names, notes))
         notes += [
-            f"{topic}: {len(told)} messages cannot be decoded and were left out ({told[0]}); check "
-            f"what sends them"
+            f"{topic}: {len(told)} message(s) that cannot be decoded were left out ({told[0]}); "
+            f"check what sends them"
             for topic, told in refused.items()
         ]
         return signals

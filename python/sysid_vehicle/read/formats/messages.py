@@ -221,7 +221,7 @@ def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]
                 f"mixed; record them under topics of their own"
             )
         notes += [
-            f"{name}/{path}: {len(texts)} messages have text in place of a number, first "
+            f"{name}/{path}: text in place of a number in {len(texts)} message(s), first "
             f"'{texts[0]}'; they count as missing: check the sensor"
             for path, texts in topic.texts.items()
         ]
@@ -229,7 +229,7 @@ def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]
         stamped = stamps > 0
         if stamped.any() and not stamped.all():
             notes.append(
-                f"{name}: {np.count_nonzero(~stamped)} of {stamps.size} messages have no stamp, "
+                f"{name}: {np.count_nonzero(~stamped)} of {stamps.size} messages without stamp, "
                 f"first message {int(np.argmin(stamped))}, and were left out; stamp the messages "
                 f"where they are measured"
             )
