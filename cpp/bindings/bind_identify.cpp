@@ -202,19 +202,22 @@ void register_identify(py::module_& m) {
         .def(
             "look_ahead",
             [](const LogwiseProblem& self, const Array& p, const Array& noise,
-               const std::vector<std::pair<std::size_t, std::size_t>>& horizons, bool readings) {
+               const std::vector<std::pair<std::size_t, std::size_t>>& horizons, bool readings,
+               const std::optional<Array>& road) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
                 std::vector<Horizon> asked;
                 asked.reserve(horizons.size());
                 for (const auto& [ahead, every] : horizons) asked.push_back({ahead, every});
+                const auto samples = static_cast<py::ssize_t>(self.samples());
+                const double* slopes = road ? matrix(*road, samples, 2, "road") : nullptr;
                 Array found = filled(asked.size() * self.samples(), kChannels, [&](double* to) {
-                    look_ahead(self, values, n, asked, to, readings);
+                    look_ahead(self, values, n, asked, to, readings, slopes);
                 });
                 return found.reshape({asked.size(), self.samples(), std::size_t{kChannels}});
             },
             py::arg("parameters"), py::arg("noise"), py::arg("horizons"),
-            py::arg("readings") = false)
+            py::arg("readings") = false, py::arg("road") = py::none())
         .def(
             "free_run",
             [](const LogwiseProblem& self, const Array& p) {

@@ -6,6 +6,7 @@ import numpy.typing as npt
 
 from ._core_banded import banded_gram as banded_gram
 from ._core_banded import banded_squares as banded_squares
+from ._core_lab_tyres import TyreLoss as TyreLoss
 from ._core_mu_slip import MagicFormulaCurve as MagicFormulaCurve
 from ._core_mu_slip import MagicFormulaFilter as MagicFormulaFilter
 from ._core_mu_slip import TwoParameterCurve as TwoParameterCurve
@@ -182,6 +183,7 @@ class Problem(metaclass=_Bound):
         noise: _Array,
         horizons: Sequence[tuple[int, int]],
         readings: bool = False,
+        road: _Array | None = None,
     ) -> _Array: ...
     def free_run(self, parameters: _Array) -> _Array: ...
 
@@ -378,23 +380,3 @@ def learn_observer_noise(
     never_fall: bool,
     accelerate: bool,
 ) -> _ObserverEm: ...
-
-# --- lab tyres
-class TyreLoss(metaclass=_Bound):
-    def __init__(
-        self,
-        car: VehicleData,
-        yaw_inertia_kgm2: float,
-        projects_steer: bool,
-        motion: _Array,
-        targets: _Array,
-        weights: _Array,
-    ) -> None: ...
-    @property
-    def samples(self) -> int: ...
-    def residuals(self, parameters: _Array, filter: None) -> _Array: ...
-    def half_sum_of_squares(self, parameters: _Array, filter: None) -> float: ...
-    def sensitivities(self, parameters: _Array, filter: None, columns: Sequence[int]) -> _Array: ...
-    def normal_equations(
-        self, parameters: _Array, filter: None, columns: Sequence[int]
-    ) -> tuple[float, _Array, _Array]: ...

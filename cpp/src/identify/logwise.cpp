@@ -230,13 +230,15 @@ void smoothed_means(const LogwiseProblem& logged, const double* p, const Logwise
 }
 
 void look_ahead(const LogwiseProblem& logged, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, double* errors, bool readings) {
+                const std::vector<Horizon>& horizons, double* errors, bool readings,
+                const double* road) {
     const std::size_t samples = logged.samples();
     std::vector<double> some;
     each(logged, p, [&](const Problem& part, const double* own, std::size_t, std::size_t before) {
         const std::size_t n = part.samples() * kChannels;
         some.resize(horizons.size() * n);
-        look_ahead(part, own, noise, horizons, some.data(), readings);
+        look_ahead(part, own, noise, horizons, some.data(), readings,
+                   road ? road + 2 * before : nullptr);
         for (std::size_t h = 0; h < horizons.size(); ++h)
             std::copy_n(some.data() + h * n, n, errors + (h * samples + before) * kChannels);
     });

@@ -59,18 +59,18 @@ class FilteredStates {
     std::vector<std::vector<double>> runs_;
 };
 
-/// Forces are not foreseen. The grade is known; the crossfall, and a grade that is not, fades from
-/// where it is known.
+/// Forces are not foreseen. Slopes of the road that are not told fade from where they are known.
 class Predictions {
   public:
     Predictions(const Problem& problem, FilteredStates filtered, const double* p,
                 const Noise& noise, const std::vector<Horizon>& horizons, bool readings,
-                double* errors)
+                bool crossfall_told, double* errors)
         : problem_(problem),
           p_(p),
           noise_(noise),
           horizons_(horizons),
           readings_(readings),
+          crossfall_told_(crossfall_told),
           errors_(errors),
           samples_(problem.samples()),
           filtered_(std::move(filtered)),
@@ -109,7 +109,8 @@ class Predictions {
         if (i < model_.states()) return known;
         const std::size_t external = i - model_.states();
         if (external < kGravityX) return 0.0;
-        return external == kGravityX && problem_.model.slope_known ? 0.0 : known;
+        const bool told = external == kGravityX || crossfall_told_;
+        return problem_.model.slope_known && told ? 0.0 : known;
     }
 
     void together(const Run& run, const std::vector<std::size_t>& asked, const std::size_t* starts,
@@ -185,7 +186,7 @@ class Predictions {
     const double* p_;
     const Noise& noise_;
     const std::vector<Horizon>& horizons_;
-    bool readings_;
+    bool readings_, crossfall_told_;
     double* errors_;
     std::size_t samples_;
     FilteredStates filtered_;
@@ -195,37 +196,42 @@ class Predictions {
     std::size_t number_ = 0, offset_ = 0;
 };
 
-std::vector<double> smoothed_of(const Problem& logged, const double* p, const Noise& noise) {
-    std::vector<double> means(logged.samples() * kStatesTold);
-    smoothed_means(logged, p, noise, means.data());
-    return means;
-}
-
-/// Gravity along as smoothed means tell it becomes known: nothing of the car foretells it, and
-/// drivers answer it. Across it does not: a smoother takes what a model errs sideways for a bank.
-void tell_grade(Problem& problem, const std::vector<double>& means) {
+/// Gravity along and across, of each sample, becomes known.
+void tell(Problem& problem, const double* slope) {
     problem.model.slope_known = true;
-    const double* grade = means.data() + kStatesFull;
     for (Run& run : problem.runs)
         for (Input& u : run.inputs) {
-            u.gravity_x_mps2 = *grade;
-            u.gravity_y_mps2 = 0.0;
-            grade += kStatesTold;
+            u.gravity_x_mps2 = *slope++;
+            u.gravity_y_mps2 = *slope++;
         }
+}
+
+/// Gravity along as smoothed means tell it, and none across.
+std::vector<double> smoothed_grade(const Problem& logged, const double* p, const Noise& noise) {
+    std::vector<double> means(logged.samples() * kStatesTold), slope(logged.samples() * 2);
+    smoothed_means(logged, p, noise, means.data());
+    for (std::size_t k = 0; k < logged.samples(); ++k)
+        slope[2 * k] = means[k * kStatesTold + kStatesFull];
+    return slope;
 }
 
 }  // namespace
 
 void look_ahead(const Problem& logged, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, double* errors, bool readings) {
+                const std::vector<Horizon>& horizons, double* errors, bool readings,
+                const double* road) {
     for (const Horizon& h : horizons)
         if (h.every == 0) throw std::invalid_argument("every = 0: give one or more");
     std::fill_n(errors, horizons.size() * logged.samples() * kChannels, std::nan(""));
     const InTime in_time(logged, p);
     Problem problem = *in_time;
     FilteredStates filtered(problem, p, noise);
-    if (!readings && noise.sloping()) tell_grade(problem, smoothed_of(logged, p, noise));
-    Predictions predictions(problem, std::move(filtered), p, noise, horizons, readings, errors);
+    if (noise.sloping() && road)
+        tell(problem, road);
+    else if (noise.sloping() && !readings)
+        tell(problem, smoothed_grade(logged, p, noise).data());
+    Predictions predictions(problem, std::move(filtered), p, noise, horizons, readings,
+                            road != nullptr, errors);
     std::size_t offset = 0;
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         predictions.of_run(i, offset);

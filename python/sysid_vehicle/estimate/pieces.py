@@ -190,7 +190,12 @@ class PiecewiseProblem:
         return np.concatenate(found)
 
     def look_ahead(
-        self, p: FloatArray, noise: FloatArray, horizons: Sequence[tuple[int, int]]
+        self,
+        p: FloatArray,
+        noise: FloatArray,
+        horizons: Sequence[tuple[int, int]],
+        *,
+        road: FloatArray | None = None,
     ) -> FloatArray:
         """Prediction errors so many samples ahead, (horizons, samples, 5)."""
         found = []
@@ -200,8 +205,10 @@ class PiecewiseProblem:
             before = part.where.start - max(ahead for ahead, _ in horizons) - part.piece.run
             begin = part.piece.run + max(before, 0) // apart * apart
             # Slopes of the road are those of the smoother, which knows what comes after.
-            problem = self.build(self.model, begin, part.piece.end + part.after)
-            errors = problem.look_ahead(p, noise, horizons)
+            end = part.piece.end + part.after
+            problem = self.build(self.model, begin, end)
+            own = None if road is None else road[begin:end]
+            errors = problem.look_ahead(p, noise, horizons, road=own)
             found.append(errors[:, part.piece.begin - begin : part.piece.end - begin])
         return np.concatenate(found, axis=1)
 

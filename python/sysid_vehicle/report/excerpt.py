@@ -58,7 +58,9 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
     if not channels:
         return None
     # To find the place predictions that begin a tenth of their length apart will do.
-    rough = look_ahead(study.fits[0], noise, driving, horizon_s, apart=0.1)[:, columns]
+    between = (study.fits[0], study.fit)
+    rough = look_ahead(study.fits[0], noise, driving, horizon_s, apart=0.1, between=between)
+    rough = rough[:, columns]
     scale = np.nanstd(measured, axis=0)
     badness = np.nansum((rough / np.where(scale > 0.0, scale, 1.0)) ** 2, axis=1)
     best: tuple[float, int, int, Stretch, int] | None = None
@@ -85,7 +87,8 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
     for title, i in stages(study):
         # Offsets are those of the whole log: a few seconds would take up every error.
         near = driving_of(study.fits[i], driving).only(Stretch(stretch.log, part))
-        errors[title] = look_ahead(study.fits[i], noise, near, horizon_s)[shown, columns]
+        ahead = look_ahead(study.fits[i], noise, near, horizon_s, between=between)
+        errors[title] = ahead[shown, columns]
     return Excerpt(
         log.name,
         horizon_s,

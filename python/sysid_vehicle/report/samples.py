@@ -111,6 +111,7 @@ def samples_of(study: Study) -> Samples | None:
     thin = max(driving.samples // _MOST, 1)
     ends = np.zeros(driving.samples, dtype=bool)
     noise = study.fit.noise.floor()
+    between = (study.fits[0], study.fit)
     for k, (title, i) in enumerate(stages(study)):
         residual = study.test[i].residual
         square, count = np.nan_to_num(residual) ** 2, np.isfinite(residual)
@@ -120,7 +121,9 @@ def samples_of(study: Study) -> Samples | None:
             if c in driving.present:
                 all_[f"r{k}.{c}"] = _running(square[:, j], count[:, j], step, begins)
         apart = thin / max(excerpt.horizon_s * float(driving.sample_rate_hz.max()), 1.0)
-        rough = look_ahead(study.fits[i], noise, driving, excerpt.horizon_s, apart=apart)
+        rough = look_ahead(
+            study.fits[i], noise, driving, excerpt.horizon_s, apart=apart, between=between
+        )
         for j, c in enumerate(excerpt.channels):
             factor, column = shown_in(c).factor, MEASURED.index(c)
             error = rough[:, column].copy()

@@ -248,7 +248,8 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
     if (BEST, fit) in test.told:
         return cast(Fit, test.told[BEST, fit])
     noise = fit.noise.floor()
-    return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD))
+    ways = tuple(_ways(fit, test))
+    return min(ways, key=lambda f: typical_error(f, noise, test, AHEAD, between=ways))
 
 
 @remembered(4)
@@ -267,7 +268,8 @@ def best_within(fit: Fit, test: Driving, final: Fit, rules: Rules = USUAL) -> Fi
     counted, noise = counted_in_shares(final, test, rules), fit.noise.floor()
     if counted.all():
         return at_its_best(fit, test)
-    return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD, counted))
+    ways = tuple(_ways(fit, test))
+    return min(ways, key=lambda f: typical_error(f, noise, test, AHEAD, counted, ways))
 
 
 def _ways(fit: Fit, test: Driving) -> list[Fit]:

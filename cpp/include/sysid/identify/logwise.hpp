@@ -60,7 +60,8 @@ void smoothed_means(const LogwiseProblem& logged, const double* p, const Noise& 
 void smoothed_means(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter,
                     double* out);
 void look_ahead(const LogwiseProblem& logged, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, double* errors, bool readings = false);
+                const std::vector<Horizon>& horizons, double* errors, bool readings = false,
+                const double* road = nullptr);
 void free_run(const LogwiseProblem& logged, const double* p, double* readings);
 
 }  // namespace sysid

@@ -159,12 +159,15 @@ struct Horizon {
 
 /// Prediction errors from the filtered state, for each horizon samples x kChannels; NaN where no
 /// prediction ends. The filter runs once, and predictions that start at one sample are one
-/// prediction, read at each horizon. Where the slope of the road varies it is that of the smoother:
-/// whoever drives answers the slopes to come, and of a prediction that does not know them a car
-/// that answers less errs less. `readings`: what is predicted itself, from what was known before;
-/// the slope of the road fades.
+/// prediction, read at each horizon. Where the slope of the road varies it is known: whoever drives
+/// answers the slopes to come, and of a prediction that does not know them a car that answers less
+/// errs less. `road`: gravity along and across at each sample. Without it the grade is that of the
+/// smoother, and the crossfall fades: a smoother takes what a model errs sideways for one, by which
+/// that model would be predicted. `readings`: what is predicted itself, from what was known before;
+/// both slopes fade.
 void look_ahead(const Problem& logged, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, double* errors, bool readings = false);
+                const std::vector<Horizon>& horizons, double* errors, bool readings = false,
+                const double* road = nullptr);
 
 /// Readings of each run, kChannels per sample, simulated from where it starts with no filter.
 void free_run(const Problem& logged, const double* p, double* readings);

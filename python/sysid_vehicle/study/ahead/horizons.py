@@ -170,8 +170,9 @@ def horizons(
     noise = fits[-1].noise.floor()
     channels = tuple(c for c in explainable(driving) if c in driving.present)
     columns = [PREDICTED.index(c) for c in channels]
+    ahead, between = tuple(horizons_s), (fits[0], fits[-1])
     by_block = np.stack(
-        [block_errors(f, noise, driving, tuple(horizons_s))[:, :, columns] for f in fits]
+        [block_errors(f, noise, driving, ahead, between)[:, :, columns] for f in fits]
     )
     with np.errstate(invalid="ignore"):
         low, middle, high = (_quantile(by_block, q) for q in (0.1, 0.5, 0.9))
@@ -196,7 +197,11 @@ def _quantile(by_block: FloatArray, q: float) -> FloatArray:
 # The poorer model of all candidates of a step is the same one.
 @remembered(64)
 def block_errors(
-    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: tuple[float, ...],
+    between: tuple[Fit, ...] = (),
 ) -> FloatArray:
     """Root mean square errors of the predicted channels, block by block.
 
@@ -207,13 +212,15 @@ def block_errors(
         Of the filter that starts the predictions.
     driving : Driving
     horizons_s : tuple of float
+    between : tuple of Fit
+        As for `all_ahead`.
 
     Returns
     -------
     array, shape (blocks, horizons, 5)
         NaN where nothing is predicted, infinite where the model lost the car.
     """
-    return _by_block(errors_ahead(fit, noise, driving, horizons_s), driving)
+    return _by_block(errors_ahead(fit, noise, driving, horizons_s, between), driving)
 
 
 def squares_ahead(
@@ -227,9 +234,10 @@ def squares_ahead(
     The squares have shape (models, blocks, horizons, channels). The last model's noise starts every
     prediction. Of these some may be counted alone, (horizons, samples), by where they end.
     """
-    noise, ahead = fits[-1].noise.floor(), tuple(horizons_s)
+    noise, ahead, between = fits[-1].noise.floor(), tuple(horizons_s), (fits[0], fits[-1])
     sensor = np.array([noise.reading[MEASURED.index(c)] for c in PREDICTED])
-    squares = np.stack([_errors_of(f, noise, driving, ahead, counted) for f in fits]) ** 2
+    errors = [_errors_of(f, noise, driving, ahead, counted, between) for f in fits]
+    squares = np.stack(errors) ** 2
     seen = np.isfinite(squares).any(axis=(0, 1))
     seen &= np.isin(PREDICTED, explainable(driving))
     return lost_as_large(as_float64(squares)), as_float64(sensor), seen
@@ -245,7 +253,11 @@ def lost_as_large(squares: FloatArray) -> FloatArray:
 
 
 def errors_ahead(
-    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: tuple[float, ...],
+    between: tuple[Fit, ...] = (),
 ) -> FloatArray:
     """Errors of the predicted channels, (horizons, samples, 5), infinite where the model fails.
 
@@ -253,15 +265,21 @@ def errors_ahead(
     remembered: a final model is held against that without each of its effects in turn.
     """
     kept = driving.samples <= _core.TOLD_SAMPLES
-    return (_errors_remembered if kept else _errors_worked_out)(fit, noise, driving, horizons_s)
+    work_out = _errors_remembered if kept else _errors_worked_out
+    return work_out(fit, noise, driving, horizons_s, between)
 
 
 def _errors_worked_out(
-    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: tuple[float, ...],
+    between: tuple[Fit, ...],
 ) -> FloatArray:
     columns = [MEASURED.index(c) for c in PREDICTED]
     try:
-        e = all_ahead(fit, noise, driving, horizons_s, apart=_APART)[:, :, columns]
+        e = all_ahead(fit, noise, driving, horizons_s, apart=_APART, between=between)
+        e = e[:, :, columns]
     except NumericalError:
         return np.full((len(horizons_s), driving.samples, len(PREDICTED)), np.inf)
     return as_float64(np.where(np.isfinite(driving.measured[:, columns]), e, np.nan))
@@ -287,11 +305,12 @@ def _errors_of(
     driving: Driving,
     horizons_s: tuple[float, ...],
     counted: Bools | None,
+    between: tuple[Fit, ...],
 ) -> FloatArray:
     """As `block_errors`, of the predictions that count."""
     if counted is None or counted.all():
-        return block_errors(fit, noise, driving, horizons_s)
-    errors = errors_ahead(fit, noise, driving, horizons_s)
+        return block_errors(fit, noise, driving, horizons_s, between)
+    errors = errors_ahead(fit, noise, driving, horizons_s, between)
     return _by_block(as_float64(np.where(counted[..., None], errors, np.nan)), driving)
 
 
@@ -301,14 +320,16 @@ def typical_error(
     driving: Driving,
     horizons_s: Sequence[float],
     counted: Bools | None = None,
+    between: tuple[Fit, ...] = (),
 ) -> float:
     """Mean logarithm of the median errors of the lateral channels, over all horizons.
 
     Infinite where the model loses the car in most blocks. Of the predictions some may be counted
-    alone, as for `squares_ahead`.
+    alone, as for `squares_ahead`; `between` as for `all_ahead`.
     """
     found = []
-    for by_block in _errors_of(fit, noise, driving, tuple(horizons_s), counted).swapaxes(0, 1):
+    errors = _errors_of(fit, noise, driving, tuple(horizons_s), counted, between)
+    for by_block in errors.swapaxes(0, 1):
         by_block = by_block[:, _LATERAL]
         known = ~np.isnan(by_block).all(axis=0)
         found += list(median_of_known(by_block[:, known], axis=0))
@@ -334,7 +355,8 @@ def changes(
     """
     noise = after.noise.floor()
     found = []
-    both = [block_errors(fit, noise, driving, tuple(horizons_s)) for fit in (before, after)]
+    ahead, models = tuple(horizons_s), (before, after)
+    both = [block_errors(fit, noise, driving, ahead, models) for fit in models]
     for i, h in enumerate(horizons_s):
         one, other = (errors[:, i] for errors in both)
         for channel in explainable(driving):

@@ -27,6 +27,7 @@ from ...errors import NumericalError
 from ...estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ...identify import Fit, driving_of
 from ...rules import Share, share_between
+from .road import told_by
 
 CHANNELS = ("vy_mps", "yaw_rate_radps", "ay_mps2", "path_m")
 AHEAD = (0.0, 0.5, 1.0, 2.0, 5.0)
@@ -202,7 +203,7 @@ def shares(
     models = (baseline,) if final is baseline else (baseline, final)
     drives = (final.driving, test)
     pairs = [(fit, driving) for fit in models for driving in drives]
-    found = in_parallel(lambda pair: _errors(pair[0], noise, pair[1], horizons_s), pairs)
+    found = in_parallel(lambda pair: _errors(pair[0], noise, pair[1], horizons_s, models), pairs)
     by_horizon = [list(zip(few[::2], few[1::2], strict=True)) for few in zip(*found, strict=True)]
     # Shape (models and ceilings, blocks, horizons, channels).
     squares = np.stack(
@@ -291,11 +292,15 @@ def _by_block(driving: Driving, at: npt.NDArray[np.intp], errors: FloatArray) ->
 
 
 def _errors(
-    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: Sequence[float]
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: Sequence[float],
+    between: Sequence[Fit],
 ) -> list[_Errors]:
     """At each horizon, samples at which predictions end, and errors, shape (predictions, 4)."""
     problem = driving_of(fit, driving).problem(fit.model)
-    p, w = fit.model.vector(), noise.vector()
+    p, w, road = fit.model.vector(), noise.vector(), told_by(fit, between, noise, driving)
     lateral = [MEASURED.index(c) for c in CHANNELS[:-1]]
     spread = spread_of_known(driving.measured[:, lateral], axis=0)
     parts: list[list[_Errors]] = [[] for _ in horizons_s]
@@ -305,7 +310,7 @@ def _errors(
         half_way = [max(n // 2, 1) for n in ahead]  # for the path
         try:
             asked = list(zip((*half_way, *ahead), (*apart, *apart), strict=True))
-            found = problem.look_ahead(p, w, asked)
+            found = problem.look_ahead(p, w, asked, road=road)
         except NumericalError:
             found = None
         for i, (n, half, every) in enumerate(zip(ahead, half_way, apart, strict=True)):

@@ -16,6 +16,7 @@ from ...compare import Comparison
 from ...errors import NumericalError
 from ...estimate import MEASURED, Driving, NoiseModel
 from ...identify import Fit, driving_of
+from .road import told_by
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,16 +113,24 @@ def waterfall(
         spread = np.array(
             [score.channels[c].noise_floor if c in score.channels else np.nan for c in MEASURED]
         )
-        return np.array([_errors(f, floor, driving, horizons, spread) for f in fits])
+        between = (fits[0], fits[-1])
+        return np.array([_errors(f, floor, driving, horizons, spread, between) for f in fits])
 
     return Waterfall(tuple(steps), horizons, errors(*train), errors(*test))
 
 
 def look_ahead(
-    fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float, *, apart: float = 0.0
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizon_s: float,
+    *,
+    apart: float = 0.0,
+    between: Sequence[Fit] = (),
 ) -> FloatArray:
     """Prediction errors so many seconds ahead, shape (samples, 5); see `all_ahead`."""
-    return as_float64(all_ahead(fit, noise, driving, (horizon_s,), apart=apart)[0])
+    ahead = all_ahead(fit, noise, driving, (horizon_s,), apart=apart, between=between)
+    return as_float64(ahead[0])
 
 
 def all_ahead(
@@ -131,6 +140,7 @@ def all_ahead(
     horizons_s: Sequence[float],
     *,
     apart: float = 0.0,
+    between: Sequence[Fit] = (),
 ) -> FloatArray:
     """Prediction errors some times ahead, at the rate of each log, but one sample at least.
 
@@ -143,6 +153,9 @@ def all_ahead(
     horizons_s : sequence of float
     apart : float
         How far predictions begin apart, as a share of the horizon; 0 for one at each sample.
+    between : sequence of Fit
+        Models that are held against each other: predictions know the crossfall that these tell
+        in the mean. Of one model alone it fades from where a prediction begins.
 
     Returns
     -------
@@ -151,6 +164,7 @@ def all_ahead(
     """
     check_time()
     problem = driving_of(fit, driving).problem(fit.model)
+    road = told_by(fit, between, noise, driving)
     errors = np.full((len(horizons_s), driving.samples, len(MEASURED)), np.nan)
     for rate in np.unique(driving.sample_rate_hz):
         own = driving.sample_rate_hz == rate
@@ -160,7 +174,9 @@ def all_ahead(
             # Channels that are read every few samples are met by steps that share no divisor.
             steps = [_prime(n) for n in steps]
         asked = list(zip(ahead, steps, strict=True))
-        errors[:, own] = problem.look_ahead(fit.model.vector(), noise.vector(), asked)[:, own]
+        errors[:, own] = problem.look_ahead(fit.model.vector(), noise.vector(), asked, road=road)[
+            :, own
+        ]
     return errors
 
 
@@ -177,10 +193,11 @@ def _errors(
     driving: Driving,
     horizons_s: Sequence[float],
     spread: FloatArray,
+    between: Sequence[Fit],
 ) -> list[float]:
     try:
         # Predictions that begin a twentieth of their length apart are wrong alike.
-        e = all_ahead(fit, noise, driving, horizons_s, apart=0.05) / spread
+        e = all_ahead(fit, noise, driving, horizons_s, apart=0.05, between=between) / spread
     except NumericalError:
         return [float("inf")] * len(horizons_s)
     e = np.where(np.isfinite(driving.measured), e, np.nan)

@@ -64,9 +64,9 @@ def apart(
     predicted = [c for c in explainable(driving) if c in driving.present]
     asked = [c for c in predicted if c in channels] or predicted
     columns = [PREDICTED.index(c) for c in asked]
-    ahead = tuple(horizons_s)
+    ahead, models = tuple(horizons_s), (one, other)
     errors = np.stack(
-        [errors_ahead(fit, noise, driving, ahead)[..., columns] for fit in (one, other)]
+        [errors_ahead(fit, noise, driving, ahead, models)[..., columns] for fit in models]
     )
     if counted is not None:
         errors[:, ~counted] = np.nan

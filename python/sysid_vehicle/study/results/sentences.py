@@ -45,7 +45,8 @@ def ahead(study: Study) -> str:
         return ""
     where = "where the car turns, on validation data"
     if study.fit.noise.sloping:
-        where += ", the grade of the road known"
+        # One model alone knows no crossfall to come: what it errs sideways looks like one.
+        where += f", the {'slope' if len(study.fits) > 1 else 'grade'} of the road known"
     return f"Median error {AHEAD_S:g} s ahead {where}: {', '.join(told)}."
 
 

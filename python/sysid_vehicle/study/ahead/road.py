@@ -1,0 +1,59 @@
+"""The slopes of the road that predictions of several models know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.memo import remembered
+from ...errors import NumericalError
+from ...estimate import Driving, NoiseModel
+from ...identify import Fit, driving_of
+
+
+def told_by(
+    model: Fit, between: Sequence[Fit], noise: NoiseModel, driving: Driving
+) -> FloatArray | None:
+    """Gravity along, as a model tells it, and across, as several do in the mean [m/s2].
+
+    Drivers answer slopes: of predictions that do not know them a car that answers less errs less.
+    What a smoother tells of a crossfall is not of the road alone: it takes a part of what its model
+    errs sideways for one, by which that model would be predicted. Of the mean each model of a pair
+    has half of what the other one errs, so that the one which errs more is predicted worse.
+
+    Parameters
+    ----------
+    model : Fit
+    between : sequence of Fit
+        Those that are held against each other.
+    noise : NoiseModel
+        Of the smoothers.
+    driving : Driving
+
+    Returns
+    -------
+    array, shape (samples, 2), or None
+        None where the road is level, where there is no other model, and where no model tells it.
+    """
+    models = tuple(dict.fromkeys(between))
+    if len(models) < 2 or not noise.sloping:
+        return None
+    own = _told(model, noise, driving)
+    found = [s[:, 1] for m in models if (s := _told(m, noise, driving)) is not None]
+    if own is None:
+        return None
+    across = np.mean(found or [own[:, 1]], axis=0)
+    return as_float64(np.column_stack([own[:, 0], across]))
+
+
+@remembered(16)
+def _told(model: Fit, noise: NoiseModel, driving: Driving) -> FloatArray | None:
+    """What one model tells; None where it loses the car."""
+    problem = driving_of(model, driving).problem(model.model)
+    try:
+        means = problem.smoothed_means(model.model.vector(), noise.vector())[:, -2:]
+    except NumericalError:
+        return None
+    return as_float64(means) if np.isfinite(means).all() else None
