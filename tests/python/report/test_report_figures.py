@@ -90,7 +90,9 @@ def test_the_excerpt_is_where_the_baseline_predicts_worst(
     study = replace(study, fits=(*study.fits[:-1], last))
     found = worst_excerpt(study)
     assert found is not None
-    whole = look_ahead(study.fits[0], study.fit.noise.floor(), study.validation, found.horizon_s)
+    first, floor = study.fits[0], study.fit.noise.floor()
+    ends = (first, study.fit)
+    whole = look_ahead(first, floor, study.validation, found.horizon_s, between=ends)
     columns = [MEASURED.index(c) for c in found.channels]
     np.testing.assert_allclose(
         found.errors["baseline"], whole[found.where][:, columns], rtol=0.02, atol=2e-3

@@ -9,9 +9,9 @@ from sysid_vehicle.diagnose import Candidate
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refit
-from sysid_vehicle.study.ahead.horizons import errors_grow, moved_by
+from sysid_vehicle.study.ahead.horizons import moved_by
 from sysid_vehicle.study.judge import contested
-from sysid_vehicle.study.judge.contested import of_no_use, other_values, spoken_against
+from sysid_vehicle.study.judge.contested import errors_grow, of_no_use, other_values, spoken_against
 from sysid_vehicle.study.judge.disagree import Disagreement
 from sysid_vehicle.study.search.together import InPlace
 

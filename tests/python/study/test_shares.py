@@ -75,7 +75,7 @@ def test_pieces_of_several_logs_count_alike(fit: Fit, course: Log) -> None:
     )
     apart = Driving.of([course.between(1.0, 12.0), course.between(13.0, 29.0)])
     assert len(begins(apart)) == 2
-    ends, errors = _errors(late, fit.noise.floor(), apart, (0.5, 1.0))[0]
+    ends, errors = _errors(late, fit.noise.floor(), apart, (0.5, 1.0), ())[0]
     problem, p = apart.problem(late.model), late.model.vector()
     rows = problem.look_ahead(p, fit.noise.floor().vector(), [(round(0.5 * course.rate_hz), 1)])[0]
     np.testing.assert_allclose(errors[:, 1], rows[ends, 2])
@@ -120,7 +120,7 @@ def test_a_channel_that_was_not_measured_is_left_out(fit: Fit, course: Log) -> N
     """Without a warning of the arithmetic: here these are errors."""
     blind = {c: np.array(course[c]) for c in course.channels if c != "vy_mps"}
     driving = Driving.of(Log.from_arrays(blind, name="blind"))
-    _, errors = _errors(fit, fit.noise.floor(), driving, (0.5,))[0]
+    _, errors = _errors(fit, fit.noise.floor(), driving, (0.5,), ())[0]
     known = np.isfinite(errors).any(axis=0)
     assert dict(zip(CHANNELS, known, strict=True)) == {
         "vy_mps": False,

@@ -30,6 +30,7 @@ from ...identify import Fit
 from ...identify.ahead.ahead import of_few
 from ...rules import ErrorChange
 from .fitted_range import Bools
+from .road import held_together
 from .waterfall import all_ahead
 
 ALONG = ("vx_mps", "ax_mps2")
@@ -39,7 +40,7 @@ _LATERAL = [PREDICTED.index(c) for c in LATERAL]
 AHEAD = (0.5, 1.0, 2.0, 5.0)
 _FEWEST = 5  # blocks that show a change
 _APART = 0.1  # of the horizon, between predictions
-_LOST = 10.0  # logarithm of the ratio, where one of two models lost the car
+LOST = 10.0  # logarithm of the ratio, where one of two models lost the car
 _OF_MEDIAN = float(np.sqrt(0.5 * np.pi))  # its standard error over that of a mean
 
 
@@ -170,7 +171,7 @@ def horizons(
     noise = fits[-1].noise.floor()
     channels = tuple(c for c in explainable(driving) if c in driving.present)
     columns = [PREDICTED.index(c) for c in channels]
-    ahead, between = tuple(horizons_s), (fits[0], fits[-1])
+    ahead, between = tuple(horizons_s), held_together((fits[0], fits[-1]), noise)
     by_block = np.stack(
         [block_errors(f, noise, driving, ahead, between)[:, :, columns] for f in fits]
     )
@@ -234,7 +235,8 @@ def squares_ahead(
     The squares have shape (models, blocks, horizons, channels). The last model's noise starts every
     prediction. Of these some may be counted alone, (horizons, samples), by where they end.
     """
-    noise, ahead, between = fits[-1].noise.floor(), tuple(horizons_s), (fits[0], fits[-1])
+    noise, ahead = fits[-1].noise.floor(), tuple(horizons_s)
+    between = held_together((fits[0], fits[-1]), noise)
     sensor = np.array([noise.reading[MEASURED.index(c)] for c in PREDICTED])
     errors = [_errors_of(f, noise, driving, ahead, counted, between) for f in fits]
     squares = np.stack(errors) ** 2
@@ -249,7 +251,7 @@ def lost_as_large(squares: FloatArray) -> FloatArray:
     It is as wrong as anything that was seen, and much more.
     """
     most = np.max(squares, axis=(0, 1), initial=0.0, where=np.isfinite(squares))
-    return as_float64(np.where(np.isinf(squares), _LOST**2 * most, squares))
+    return as_float64(np.where(np.isinf(squares), LOST**2 * most, squares))
 
 
 def errors_ahead(
@@ -328,7 +330,8 @@ def typical_error(
     alone, as for `squares_ahead`; `between` as for `all_ahead`.
     """
     found = []
-    errors = _errors_of(fit, noise, driving, tuple(horizons_s), counted, between)
+    held = held_together(between, noise)
+    errors = _errors_of(fit, noise, driving, tuple(horizons_s), counted, held)
     for by_block in errors.swapaxes(0, 1):
         by_block = by_block[:, _LATERAL]
         known = ~np.isnan(by_block).all(axis=0)
@@ -355,8 +358,8 @@ def changes(
     """
     noise = after.noise.floor()
     found = []
-    ahead, models = tuple(horizons_s), (before, after)
-    both = [block_errors(fit, noise, driving, ahead, models) for fit in models]
+    ahead, between = tuple(horizons_s), held_together((before, after), noise)
+    both = [block_errors(fit, noise, driving, ahead, between) for fit in (before, after)]
     for i, h in enumerate(horizons_s):
         one, other = (errors[:, i] for errors in both)
         for channel in explainable(driving):
@@ -368,7 +371,7 @@ def changes(
                 continue
             with np.errstate(divide="ignore", over="ignore"):
                 ratio = np.log(other[known, j]) - np.log(one[known, j])
-            ratio = np.clip(ratio, -_LOST, _LOST)
+            ratio = np.clip(ratio, -LOST, LOST)
             middle = float(np.median(ratio))
             scatter = NORMAL_MAD * float(np.median(np.abs(ratio - middle)))
             found.append(
@@ -380,27 +383,3 @@ def changes(
                 )
             )
     return tuple(found)
-
-
-def errors_grow(first: Fit, final: Fit, test: Driving, channels: Collection[str]) -> bool:
-    """Whether the errors ahead of some channels grow, in the mean over these and all horizons.
-
-    Shares are asked of parameters that predict best (`at_its_best`). What a study prints, and its
-    user gets, is the model as it was fitted.
-
-    Parameters
-    ----------
-    first, final : Fit
-    test : Driving
-        Validation data.
-    channels : collection of str
-        As `moved_by` finds them.
-    """
-    found = horizons((first, final), ("first", "final"), test)
-    moved = [c in channels for c in found.channels]
-    before, after = (error[:, moved] for error in found.error)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        grown = np.log(after) - np.log(before)
-    # Of what both models lose, or neither predicts, there is nothing to be learnt.
-    grown = np.clip(grown[~np.isnan(grown)], -_LOST, _LOST)
-    return bool(grown.size and grown.mean() > 0.0)

@@ -13,6 +13,12 @@ from ...estimate import Driving, NoiseModel
 from ...identify import Fit, driving_of
 
 
+def held_together(models: Sequence[Fit], noise: NoiseModel) -> tuple[Fit, ...]:
+    """Those of which the crossfall is told: none where there is only one, or the road is level."""
+    several = tuple(dict.fromkeys(models))
+    return several if len(several) > 1 and noise.sloping else ()
+
+
 def told_by(
     model: Fit, between: Sequence[Fit], noise: NoiseModel, driving: Driving
 ) -> FloatArray | None:
@@ -37,10 +43,8 @@ def told_by(
     array, shape (samples, 2), or None
         None where the road is level, where there is no other model, and where no model tells it.
     """
-    models = tuple(dict.fromkeys(between))
-    if len(models) < 2 or not noise.sloping:
-        return None
-    own = _told(model, noise, driving)
+    models = held_together(between, noise)
+    own = _told(model, noise, driving) if models else None
     found = [s[:, 1] for m in models if (s := _told(m, noise, driving)) is not None]
     if own is None:
         return None

@@ -17,6 +17,7 @@ from ...estimate import MEASURED, Driving, equal_blocks, moving
 from ...identify import Fit
 from .fitted_range import Bools
 from .horizons import PREDICTED, errors_ahead, explainable, lost_as_large
+from .road import held_together
 
 
 class Apart(NamedTuple):
@@ -64,9 +65,9 @@ def apart(
     predicted = [c for c in explainable(driving) if c in driving.present]
     asked = [c for c in predicted if c in channels] or predicted
     columns = [PREDICTED.index(c) for c in asked]
-    ahead, models = tuple(horizons_s), (one, other)
+    ahead, between = tuple(horizons_s), held_together((one, other), noise)
     errors = np.stack(
-        [errors_ahead(fit, noise, driving, ahead, models)[..., columns] for fit in models]
+        [errors_ahead(fit, noise, driving, ahead, between)[..., columns] for fit in (one, other)]
     )
     if counted is not None:
         errors[:, ~counted] = np.nan

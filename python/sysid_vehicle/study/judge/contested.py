@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..._common.arrays import FloatArray
 from ..._common.text import few, number, unit_after
 from ...diagnose import possible
@@ -17,7 +19,7 @@ from ...effects import Effect
 from ...estimate import Driving
 from ...identify import Fit
 from ...rules import USUAL, Rules
-from ..ahead.horizons import errors_grow, moved_by
+from ..ahead.horizons import LOST, horizons, moved_by
 from ..results.widened import estimates_of
 from ..search.steps import insignificant
 from ..search.together import InPlace
@@ -149,3 +151,27 @@ def other_values(found: Sequence[Disagreement], fit: Fit, rules: Rules = USUAL) 
         if felt and abs(here + there) < rules.insignificant * abs(here - there):
             told.setdefault(d.train.name.split(".")[0], []).append(str(d))
     return {e: "; ".join(some) for e, some in told.items()}
+
+
+def errors_grow(first: Fit, final: Fit, test: Driving, channels: Collection[str]) -> bool:
+    """Whether the errors ahead of some channels grow, in the mean over these and all horizons.
+
+    Shares are asked of parameters that predict best (`at_its_best`). What a study prints, and its
+    user gets, is the model as it was fitted.
+
+    Parameters
+    ----------
+    first, final : Fit
+    test : Driving
+        Validation data.
+    channels : collection of str
+        As `moved_by` finds them.
+    """
+    found = horizons((first, final), ("first", "final"), test)
+    moved = [c in channels for c in found.channels]
+    before, after = (error[:, moved] for error in found.error)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = np.log(after) - np.log(before)
+    # Of what both models lose, or neither predicts, there is nothing to be learnt.
+    grown = np.clip(grown[~np.isnan(grown)], -LOST, LOST)
+    return bool(grown.size and grown.mean() > 0.0)
