@@ -65,7 +65,7 @@ NUMERICAL = {
     "diagnose/evidence/sensitivity.py": {"_AT_ONCE", "_BOUNDED", "_SHARES"},
     "diagnose/candidates/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
-    "study/ahead/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
+    "study/ahead/horizons.py": {"AHEAD", "_FEWEST", "_APART", "LOST"},
     "study/ahead/beyond.py": {"_DRAWS"},
     "study/judge/foretold.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "study/limit.py": {"_BASELINE", "_SEARCHED", "_SENSORS", "_STEP"},
