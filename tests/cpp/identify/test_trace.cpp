@@ -127,7 +127,7 @@ TEST(LookAhead, ErrorOfAWrongModelGrowsWithTheHorizon) {
     EXPECT_GT(yaw_rate_error(30), 1.5 * yaw_rate_error(3));
 }
 
-TEST(LookAhead, ErrorsKnowTheSlopesToComeAndReadingsDoNot) {
+TEST(LookAhead, ErrorsKnowTheSlopesThatAreToldOrTheGradeAloneAndReadingsNone) {
     Parameters p = typical_parameters();
     for (const std::size_t samples : {std::size_t{600}, std::size_t{6000}}) {  // in pieces, too
         const auto slopes = mask_of({"road_bank", "road_grade"});
@@ -137,20 +137,28 @@ TEST(LookAhead, ErrorsKnowTheSlopesToComeAndReadingsDoNot) {
         Noise noise = sloping_noise();
         noise.road_time_s = 0.5;
         const std::size_t ahead = 150;
-        std::vector<double> knowing(problem.samples() * kChannels), foreseen(knowing.size());
-        look_ahead(problem, p.data(), noise, {{ahead, 3}}, knowing.data());
+        std::vector<double> told(samples * kChannels), alone(told.size()), foreseen(told.size());
+        std::vector<double> means(samples * kStatesTold), road(samples * 2);
+        smoothed_means(problem, p.data(), noise, means.data());
+        for (std::size_t k = 0; k < samples; ++k)
+            std::copy_n(&means[k * kStatesTold + kStatesFull], 2, &road[2 * k]);
+        look_ahead(problem, p.data(), noise, {{ahead, 3}}, told.data(), false, road.data());
+        look_ahead(problem, p.data(), noise, {{ahead, 3}}, alone.data());
         look_ahead(problem, p.data(), noise, {{ahead, 3}}, foreseen.data(), true);
         for (const int c : {kVx, kVy}) {
             const double sensor = noise.sensor[static_cast<std::size_t>(c)];
-            double with = 0.0, without = 0.0, count = 0.0;
-            for (std::size_t k = ahead; k < problem.samples(); k += 3) {
+            double with = 0.0, by_grade = 0.0, without = 0.0, count = 0.0;
+            for (std::size_t k = ahead; k < samples; k += 3) {
                 const std::size_t n = k * kChannels + static_cast<std::size_t>(c);
-                with += std::pow(knowing[n], 2);
+                with += std::pow(told[n], 2);
+                by_grade += std::pow(alone[n], 2);
                 without += std::pow(problem.runs[0].measurements[k][c] - foreseen[n], 2);
                 count += sensor * sensor;
             }
             EXPECT_LT(with, 1.5 * count) << c << " of " << samples;
             EXPECT_GT(without, 3.0 * count) << c << " of " << samples;
+            if (c == kVx) EXPECT_LT(by_grade, 1.5 * count) << samples;
+            if (c == kVy) EXPECT_GT(by_grade, 3.0 * count) << samples;
         }
     }
 }
