@@ -36,8 +36,7 @@ def fitted(logs: list[sv.Log]) -> sv.Fit:
 
 
 @pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
-@pytest.mark.parametrize("with_vy", [True, False])
-@pytest.mark.parametrize("slope_rad", [0.0, 0.015])
+@pytest.mark.parametrize(("with_vy", "slope_rad"), [(True, 0.015), (False, 0.0)])
 def test_coloured_sensors_are_told_with_size_and_time(with_vy: bool, slope_rad: float) -> None:
     fit = fitted(log_of(with_vy, WANDERS, slope_rad))
     yaw, along, across = fit.noise.colour
