@@ -96,6 +96,10 @@ def test_slopes_that_predictions_know_are_those_of_the_whole(
     whole, pieces = (q.look_ahead(p, noise, asked) for q in problems)
     assert off(whole, pieces) < 1e-6
     assert off(problems[0].look_ahead(p, level, asked), whole) > 0.1
+    road = np.outer(np.linspace(-1.0, 1.0, problems[0].samples), [0.3, -0.5])
+    on_one, in_pieces = (q.look_ahead(p, noise, asked, road=road) for q in problems)
+    assert off(on_one, in_pieces) < 1e-6
+    assert off(on_one, whole) > 0.1
 
 
 def test_a_slow_state_has_a_longer_lead(
