@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log, Model, RoadDisturbance, compare, drive, identify
+from sysid_vehicle._common.memo import forget
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import MEASURED, Driving, turning, turning_blocks
 from sysid_vehicle.identify.ahead.ahead import of_few
 from sysid_vehicle.manoeuvres import usual_road
 from sysid_vehicle.rules import Share, worse
 from sysid_vehicle.study import validation
+from sysid_vehicle.study.ahead import road
 from sysid_vehicle.study.ahead.beyond import Beyond, beyond_noise, own_share
 from sysid_vehicle.study.ahead.horizons import (
     LATERAL,
@@ -139,10 +141,12 @@ def test_no_prediction_knows_the_crossfall_to_come(fit: Fit, altered: Callable[.
     assert np.all(moved[[MEASURED.index(c) for c in LATERAL]] < 1e-3)
 
 
-def test_models_that_are_held_against_each_other_know_the_same_crossfall(fit: Fit) -> None:
-    road = RoadDisturbance(slope_rad=0.015)
+def test_models_that_are_held_against_each_other_know_the_same_crossfall(
+    fit: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hills = RoadDisturbance(slope_rad=0.015)
     biased = fit.model.add("gyro_bias").with_values({"gyro_bias.bias_radps": 0.02})
-    log = drive(biased, usual_road("country", 40.0, 4), seed=7, disturbance=road, rate_hz=50.0)
+    log = drive(biased, usual_road("country", 40.0, 4), seed=7, disturbance=hills, rate_hz=50.0)
     right = replace(identify(biased, log, starts=1), model=biased)
     without = replace(right, model=fit.model)
     driving, noise = Driving.of(log), right.noise.floor()
@@ -159,6 +163,13 @@ def test_models_that_are_held_against_each_other_know_the_same_crossfall(fit: Fi
     for alone in ((), (right,), (right, right)):
         assert told_by(right, alone, noise, driving) is None
     assert told_by(right, models, replace(noise, road=(0.0, 0.0)), driving) is None
+    # Of long driving what is remembered would fill the memory.
+    assert {f for f, *_ in road._told_remembered.known()} >= {*models}
+    forget()
+    monkeypatch.setattr(road._core, "TOLD_SAMPLES", 100)
+    assert told_by(right, models, noise, driving) is not None
+    assert not road._told_remembered
+    monkeypatch.undo()
     # The biased model's own smoother makes a bank of a part of the bias: it is told of half of it.
     assert np.abs(slopes[0] - slopes[1])[:, 1].mean() > 0.1
     yaw = PREDICTED.index("yaw_rate_radps")

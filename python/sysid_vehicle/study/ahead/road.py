@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.memo import remembered
 from ...errors import NumericalError
@@ -52,12 +53,20 @@ def told_by(
     return as_float64(np.column_stack([own[:, 0], across]))
 
 
-@remembered(16)
 def _told(model: Fit, noise: NoiseModel, driving: Driving) -> FloatArray | None:
-    """What one model tells; None where it loses the car."""
+    """What one model tells, remembered of short driving; None where it loses the car."""
+    kept = driving.samples <= _core.TOLD_SAMPLES
+    return (_told_remembered if kept else _told_worked_out)(model, noise, driving)
+
+
+def _told_worked_out(model: Fit, noise: NoiseModel, driving: Driving) -> FloatArray | None:
     problem = driving_of(model, driving).problem(model.model)
     try:
-        means = problem.smoothed_means(model.model.vector(), noise.vector())[:, -2:]
+        means = problem.smoothed_means(model.model.vector(), noise.vector())
     except NumericalError:
         return None
-    return as_float64(means) if np.isfinite(means).all() else None
+    slopes = means[:, -2:].copy()  # a view would hold all of the states
+    return slopes if np.isfinite(slopes).all() else None
+
+
+_told_remembered = remembered(16)(_told_worked_out)
