@@ -7,15 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, InvalidInput, Log, Model, RoadDisturbance, compare, drive, identify
-from sysid_vehicle._common.memo import forget
+from sysid_vehicle import Fit, InvalidInput, Log, Model, RoadDisturbance, compare, drive
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import MEASURED, Driving, turning, turning_blocks
 from sysid_vehicle.identify.ahead.ahead import of_few
 from sysid_vehicle.manoeuvres import usual_road
 from sysid_vehicle.rules import Share, worse
 from sysid_vehicle.study import validation
-from sysid_vehicle.study.ahead import road
 from sysid_vehicle.study.ahead.beyond import Beyond, beyond_noise, own_share
 from sysid_vehicle.study.ahead.horizons import (
     LATERAL,
@@ -25,9 +23,7 @@ from sysid_vehicle.study.ahead.horizons import (
     horizons,
     moved_by,
     moving_with,
-    squares_ahead,
 )
-from sysid_vehicle.study.ahead.road import told_by
 from sysid_vehicle.study.ahead.waterfall import look_ahead
 from sysid_vehicle.study.judge.matters import sizes_that_matter, sufficient, within
 from sysid_vehicle.study.validation import AHEAD, at_its_best
@@ -139,44 +135,6 @@ def test_no_prediction_knows_the_crossfall_to_come(fit: Fit, altered: Callable[.
     told = [d.measured - look_ahead(fit, noise, d, 2.0) for d in drives]
     moved = np.nanmax(np.abs(told[1] - told[0])[late : late + 100], axis=0)  # begun before
     assert np.all(moved[[MEASURED.index(c) for c in LATERAL]] < 1e-3)
-
-
-def test_models_that_are_held_against_each_other_know_the_same_crossfall(
-    fit: Fit, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    hills = RoadDisturbance(slope_rad=0.015)
-    biased = fit.model.add("gyro_bias").with_values({"gyro_bias.bias_radps": 0.02})
-    log = drive(biased, usual_road("country", 40.0, 4), seed=7, disturbance=hills, rate_hz=50.0)
-    right = replace(identify(biased, log, starts=1), model=biased)
-    without = replace(right, model=fit.model)
-    driving, noise = Driving.of(log), right.noise.floor()
-    models = (without, right)
-    means = [
-        driving.problem(f.model).smoothed_means(f.model.vector(), noise.vector()) for f in models
-    ]
-    slopes = [m[:, -2:] for m in means]
-    for model, own in zip(models, slopes, strict=True):
-        told = told_by(model, models, noise, driving)
-        assert told is not None
-        np.testing.assert_allclose(told[:, 0], own[:, 0])
-        np.testing.assert_allclose(told[:, 1], 0.5 * (slopes[0] + slopes[1])[:, 1])
-    for alone in ((), (right,), (right, right)):
-        assert told_by(right, alone, noise, driving) is None
-    assert told_by(right, models, replace(noise, road=(0.0, 0.0)), driving) is None
-    # Of long driving what is remembered would fill the memory.
-    assert {f for f, *_ in road._told_remembered.known()} >= {*models}
-    forget()
-    monkeypatch.setattr(road._core, "TOLD_SAMPLES", 100)
-    assert told_by(right, models, noise, driving) is not None
-    assert not road._told_remembered
-    monkeypatch.undo()
-    # The biased model's own smoother makes a bank of a part of the bias: it is told of half of it.
-    assert np.abs(slopes[0] - slopes[1])[:, 1].mean() > 0.1
-    yaw = PREDICTED.index("yaw_rate_radps")
-    before, after = np.nanmedian(squares_ahead(models, driving, (1.0, 2.0, 5.0))[0], axis=1)[
-        :, :, yaw
-    ]
-    assert np.all(before > 4.0 * after)
 
 
 def test_a_spin_does_not_decide(

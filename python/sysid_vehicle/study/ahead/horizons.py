@@ -171,7 +171,7 @@ def horizons(
     noise = fits[-1].noise.floor()
     channels = tuple(c for c in explainable(driving) if c in driving.present)
     columns = [PREDICTED.index(c) for c in channels]
-    ahead, between = tuple(horizons_s), held_together((fits[0], fits[-1]), noise)
+    ahead, between = tuple(horizons_s), (fits[0], fits[-1])
     by_block = np.stack(
         [block_errors(f, noise, driving, ahead, between)[:, :, columns] for f in fits]
     )
@@ -195,8 +195,6 @@ def _quantile(by_block: FloatArray, q: float) -> FloatArray:
     return as_float64(out)
 
 
-# The poorer model of all candidates of a step is the same one.
-@remembered(64)
 def block_errors(
     fit: Fit,
     noise: NoiseModel,
@@ -221,7 +219,20 @@ def block_errors(
     array, shape (blocks, horizons, 5)
         NaN where nothing is predicted, infinite where the model lost the car.
     """
-    return _by_block(errors_ahead(fit, noise, driving, horizons_s, between), driving)
+    held = held_together(between, noise)
+    return _block_errors_remembered(fit, noise, driving, horizons_s, held)
+
+
+# On a level road the poorer model of all candidates of a step is asked the same.
+@remembered(64)
+def _block_errors_remembered(
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: tuple[float, ...],
+    held: tuple[Fit, ...],
+) -> FloatArray:
+    return _by_block(errors_ahead(fit, noise, driving, horizons_s, held), driving)
 
 
 def squares_ahead(
@@ -235,8 +246,7 @@ def squares_ahead(
     The squares have shape (models, blocks, horizons, channels). The last model's noise starts every
     prediction. Of these some may be counted alone, (horizons, samples), by where they end.
     """
-    noise, ahead = fits[-1].noise.floor(), tuple(horizons_s)
-    between = held_together((fits[0], fits[-1]), noise)
+    noise, ahead, between = fits[-1].noise.floor(), tuple(horizons_s), (fits[0], fits[-1])
     sensor = np.array([noise.reading[MEASURED.index(c)] for c in PREDICTED])
     errors = [_errors_of(f, noise, driving, ahead, counted, between) for f in fits]
     squares = np.stack(errors) ** 2
@@ -268,7 +278,7 @@ def errors_ahead(
     """
     kept = driving.samples <= _core.TOLD_SAMPLES
     work_out = _errors_remembered if kept else _errors_worked_out
-    return work_out(fit, noise, driving, horizons_s, between)
+    return work_out(fit, noise, driving, horizons_s, held_together(between, noise))
 
 
 def _errors_worked_out(
@@ -330,8 +340,7 @@ def typical_error(
     alone, as for `squares_ahead`; `between` as for `all_ahead`.
     """
     found = []
-    held = held_together(between, noise)
-    errors = _errors_of(fit, noise, driving, tuple(horizons_s), counted, held)
+    errors = _errors_of(fit, noise, driving, tuple(horizons_s), counted, between)
     for by_block in errors.swapaxes(0, 1):
         by_block = by_block[:, _LATERAL]
         known = ~np.isnan(by_block).all(axis=0)
@@ -358,8 +367,8 @@ def changes(
     """
     noise = after.noise.floor()
     found = []
-    ahead, between = tuple(horizons_s), held_together((before, after), noise)
-    both = [block_errors(fit, noise, driving, ahead, between) for fit in (before, after)]
+    ahead, models = tuple(horizons_s), (before, after)
+    both = [block_errors(fit, noise, driving, ahead, models) for fit in models]
     for i, h in enumerate(horizons_s):
         one, other = (errors[:, i] for errors in both)
         for channel in explainable(driving):

@@ -17,7 +17,6 @@ from ...estimate import MEASURED, Driving, equal_blocks, moving
 from ...identify import Fit
 from .fitted_range import Bools
 from .horizons import PREDICTED, errors_ahead, explainable, lost_as_large
-from .road import held_together
 
 
 class Apart(NamedTuple):
@@ -65,9 +64,9 @@ def apart(
     predicted = [c for c in explainable(driving) if c in driving.present]
     asked = [c for c in predicted if c in channels] or predicted
     columns = [PREDICTED.index(c) for c in asked]
-    ahead, between = tuple(horizons_s), held_together((one, other), noise)
+    ahead, models = tuple(horizons_s), (one, other)
     errors = np.stack(
-        [errors_ahead(fit, noise, driving, ahead, between)[..., columns] for fit in (one, other)]
+        [errors_ahead(fit, noise, driving, ahead, models)[..., columns] for fit in models]
     )
     if counted is not None:
         errors[:, ~counted] = np.nan
