@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,18 +52,20 @@ def build(
     vehicle: Vehicle | None = None,
     *,
     told: bool = False,
+    worded: Callable[[str], str] = str,
 ) -> Built:
     """Make the channels of a log; every error and warning begins with the log's `name`.
 
-    What was `told` when the log was read is no warning again.
+    What was `told` when the log was read is no warning again. `worded` gives errors and warnings
+    what only the reader of the file knows.
     """
     notes: list[str] = []
     try:
         built = _build(data, tuple(despike), check, vehicle, notes)
     except InvalidInput as error:
-        raise InvalidInput(f"{name}: {error}") from error
+        raise InvalidInput(f"{name}: {worded(str(error))}") from error
     for note in () if told else notes:
-        warn(f"{name}: {note}")
+        warn(f"{name}: {worded(note)}")
     return built
 
 

@@ -10,6 +10,7 @@ from .._common.files import as_path
 from .._common.typed import typed
 from ..errors import warn
 from ..log import Columns, Log
+from ..log.build import build
 from ..vehicle import Vehicle
 from .formats.csv import read_table
 from .formats.objects import contents_of_object
@@ -19,6 +20,7 @@ from .mapping.ground import Ground
 from .mapping.proposal import Proposal
 from .mapping.propose import propose_channels
 from .mapping.source import Source
+from .mapping.taken import Taken
 from .recording import Recording
 from .registry import FORMATS, Format, located, read_with, recognised
 from .table import Table
@@ -108,8 +110,10 @@ def read_log(
     for note in notes:
         warn(f"{run}: {note}")
     despike = mapping.despiked
+    worded = Taken(mapping.factors(table)).beside
     with located(where, run):
-        return Log.from_arrays(columns, name=run, despike=despike, check=check, vehicle=vehicle)
+        built = build(columns, run, despike, check, vehicle, worded=worded)
+    return Log(run, built.rate_hz, built.uniform, built.channels)
 
 
 def contents(

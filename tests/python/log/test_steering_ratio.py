@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 
 import pytest
+from single_track import drive
 
 import sysid_vehicle as sv
 from sysid_vehicle.errors import SysidWarning
@@ -37,3 +39,13 @@ def test_a_ratio_of_38_for_20_is_told_and_the_right_one_is_not(seed: int) -> Non
 def test_what_is_not_sure_is_not_told() -> None:
     log = sv.drive(sv.Model(CAR), sv.manoeuvres.slalom(), seed=52119)
     assert told(log, 20.0 / 38.0) == []
+
+
+def test_a_steering_wheel_is_told_with_what_its_ratio_may_be() -> None:
+    """The car is not known there: of usual wheelbases and understeer follows a range."""
+    data = drive()
+    data["steer_rad"] *= 18.0
+    with pytest.raises(sv.InvalidInput, match="put factor = 1 / steering ratio") as caught:
+        sv.Log.from_arrays(data)
+    low, high = map(float, re.findall(r"about ([\d.]+) to ([\d.]+)\)", str(caught.value))[0])
+    assert low < 1.0 / 18.0 < high

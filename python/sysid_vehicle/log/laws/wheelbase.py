@@ -145,9 +145,10 @@ def check_steering(drive: Drive) -> list[Contradiction]:
             text = f"{told}; if this is no model car, {fits}"
             return [Contradiction("steer_rad", text, by_the_car=True)]
         raise Implausible("steer_rad", f"{told}; {fits}")
+    low, high = math.exp(-spread) / ratio, math.exp(spread) / ratio
     what = (
         f"if it is the angle of the steering wheel, put factor = 1 / steering ratio (about "
-        f"{1.0 / ratio:.2g}) in the channel map"
+        f"{low:.1g} to {high:.1g}) in the channel map"
         if ratio < 32.0
         else f"if it is in degrees, put factor = {DEG} in the channel map"
         if ratio < 200.0

@@ -204,6 +204,19 @@ class ChannelMap:
         commands = {c: s.delay_s for c, s in self.sources.items() if s.held}
         return stand(result, commands) if commands and "time_s" in result else result
 
+    def factors(self, table: Table) -> dict[str, float]:
+        """Return what the columns of `table` are multiplied by, by canonical channel.
+
+        Of a velocity over ground nothing is told: its parts are other channels.
+        """
+        sources = {c: Source(c) for c in CHANNELS if table.counts[c]} | dict(self.sources)
+        return {
+            channel: stated_factor(table, s.column, channel, s.unit_of(channel), [])
+            if s.as_stated
+            else s.factor
+            for channel, s in sources.items()
+        }
+
     def _slip_to_speed(self, columns: dict[str, FloatArray]) -> None:
         """Make the lateral speed of a sideslip angle, if that is what the map or the file gives."""
         source = self.sources.get("vy_mps")
