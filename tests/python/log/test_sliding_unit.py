@@ -54,6 +54,14 @@ def test_units_are_told_wherever_the_sensor_is(manoeuvre: str, forward_m: float)
         assert unit in found[3].split(" or ")
 
 
+@pytest.mark.parametrize("roll", [1.1, 1.15])
+def test_a_body_that_rolls_makes_no_other_unit(driven: dict[str, np.ndarray], roll: float) -> None:
+    """The accelerometer reads gravity by roll, the factor is smaller: km/h were told as ft/s."""
+    wrong = driven | {"vy_mps": 3.6 * driven["vy_mps"], "ay_mps2": roll * driven["ay_mps2"]}
+    with pytest.warns(SysidWarning, match=r"vy_mps: changes .* seems to be in .*km/h"):
+        sv.Log.from_arrays(wrong, name="kmh")
+
+
 @pytest.mark.parametrize("late", ["ay_mps2", "yaw_rate_radps"])
 def test_what_is_late_is_told_as_late(driven: dict[str, np.ndarray], late: str) -> None:
     shifted = {n: v[:-10] if n == late else v[10:] for n, v in driven.items()}

@@ -81,6 +81,21 @@ def test_what_is_warned_of_stands_beside_the_factor_too() -> None:
         read_log(data, channels)
 
 
+def test_of_a_law_that_is_doubted_each_factor_is_told() -> None:
+    data = table(yaw_rate_radps=6 / DEG, vx_mps=2.0)
+    said = refused(data, yaw_rate_radps=DEG, vx_mps=0.5)
+    assert "check the units of these channels" in said
+    assert said.endswith(f"{SAID}0.5 for vx_mps, 0.01745329 for yaw_rate_radps")
+
+
+def test_what_a_law_compares_with_is_not_to_be_multiplied() -> None:
+    channels = {c: {"column": f"col {c}"} for c in drive()}
+    channels["vx_mps"]["factor"] = 0.5  # type: ignore[assignment]
+    with pytest.warns(SysidWarning, match="vy_mps: changes .* in km/h") as caught:
+        read_log(table(vy_mps=3.6, vx_mps=2.0), channels)
+    assert not any(SAID in str(w.message) for w in caught)
+
+
 def followed(data: dict[str, np.ndarray]) -> dict[str, float]:
     """Factors to which the messages lead whoever does what they say."""
     factors = dict.fromkeys(drive(), 1.0)

@@ -157,8 +157,10 @@ def _scale(
             break
     else:
         return None
-    off = {unit: abs(times - more) for unit, more in SPEED_UNITS.items()}
-    near = [unit for unit in sorted(off, key=lambda unit: off[unit]) if off[unit] <= sure]
+    # Where accelerometer and gyro disagree, as on a body that rolls, either may be the right one.
+    by_gyro = times + max(float(found.coefficients[1]), 0.0)
+    near = [u for u, more in SPEED_UNITS.items() if times - sure <= more <= by_gyro + sure]
+    near.sort(key=lambda u: min(abs(at - SPEED_UNITS[u]) for at in (times, by_gyro)))
     named = f"it seems to be in {' or '.join(near)}" if near else "check its unit"
     more = ", ".join(f"{1.0 / SPEED_UNITS[unit]:.4g} for {unit}" for unit in near or SPEED_UNITS)
     text = (

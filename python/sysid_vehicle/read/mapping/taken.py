@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from ...log import CHANNELS, listed
 
+_THESE = "of these channels"
+
 
 @dataclass(frozen=True)
 class Taken:
@@ -35,9 +37,10 @@ class Taken:
         _, factor, remedy = told.partition("factor")
         if not factor:
             return told
-        named = _words(remedy)
-        if " for it" in remedy or not any(c in CHANNELS for c in named):
-            named = [*_words(told), *named]
+        channels, named = _channels(told), _channels(remedy)
+        if " for it" in remedy or not named:
+            # Of itself a message speaks first, and of a law it doubts each part.
+            named = channels if _THESE in told else [*channels[:1], *named]
         present = [f"{self.factors[c]:.7g} for {c}" for c in dict.fromkeys(named) if self._has(c)]
         if not present:
             return told
@@ -47,5 +50,5 @@ class Taken:
         return self.factors.get(channel, 1.0) != 1.0
 
 
-def _words(text: str) -> list[str]:
-    return re.findall(r"\w+", text)
+def _channels(text: str) -> list[str]:
+    return [word for word in re.findall(r"\w+", text) if word in CHANNELS]
