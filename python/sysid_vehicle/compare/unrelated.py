@@ -17,6 +17,7 @@ from ..estimate import MEASURED, Driving, NoiseModel
 from ..estimate.inputs import white_noise_std
 from ..log import Contradiction, Log
 from ..model import Model
+from .clock import steering_on_time
 
 _IGNORANT = 2.0  # times the usual spread
 _WORSE = 1.1  # of the channel's variance: a prediction that errs more is worse than the mean
@@ -83,26 +84,39 @@ def incoherent(driving: Driving, model: Model, noise: NoiseModel | None = None) 
     model : Model
         What its effects do themselves, with the values that they have, is no contradiction.
     noise : NoiseModel, optional
-        Beside the model: neither is what a road does whose slope varies, where it has one.
+        Beside the model: neither is what a road does whose slope varies, where it has one, nor a
+        lag of the steering that the likelihood does not see.
 
     Returns
     -------
     dict of str to str
         A sentence for each such channel.
     """
-    varies = noise is not None and noise.sloping
-    on_a_slope = varies or any(e.breaks == "on a slope" for e in model.parts)
     found: dict[str, str] = {}
-    for log in driving.logs:
+    for own in driving.each_log():
+        log = own.logs[0]
         for c in log.contradictions:
-            if c.late_s and abs(c.late_s) <= _TIMES * _own_lag_s(model, c, log):
-                continue
-            if c.on_the_level and on_a_slope:
-                continue
-            found.setdefault(
-                c.channel, f"{log.name}: {c.text}" if len(driving.logs) > 1 else c.text
-            )
+            if not _explained(c, own, model, noise):
+                text = f"{log.name}: {c.text}" if len(driving.logs) > 1 else c.text
+                found.setdefault(c.channel, text)
     return found
+
+
+def _explained(
+    told: Contradiction, driving: Driving, model: Model, noise: NoiseModel | None
+) -> bool:
+    """Whether the model does what a log of `driving` is told for, or finds that it is not so."""
+    if told.on_the_level:
+        on_a_slope = any(e.breaks == "on a slope" for e in model.parts)
+        if on_a_slope or (noise is not None and noise.sloping):
+            return True
+    if not told.late_s:
+        return False
+    if abs(told.late_s) <= _TIMES * _own_lag_s(model, told, driving.logs[0]):
+        return True
+    if noise is None or told.channel != "steer_rad":
+        return False
+    return steering_on_time(driving, model, noise, told.late_s)
 
 
 def _own_lag_s(model: Model, told: Contradiction, log: Log) -> float:
