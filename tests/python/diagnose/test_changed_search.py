@@ -169,6 +169,29 @@ def test_of_two_changes_each_leads_to_the_other(monkeypatch: pytest.MonkeyPatch)
     assert tried == [frozenset((*imitator, "road_grade")), frozenset(one + other)]
 
 
+@pytest.mark.parametrize(("left", "found"), [("aero_drag", "two"), ("force_gain", "one")])
+def test_what_lines_still_tell_beside_the_leading_change_is_sought_in_twos(
+    monkeypatch: pytest.MonkeyPatch, left: str, found: str
+) -> None:
+    imitator, two = ("force_gain",), ("mass", "aero_drag")
+    evidence = {(): 0.0, imitator: 90.0, two: 120.0}
+    search = searching(monkeypatch, dict.fromkeys((*imitator, *two), 1e-9), evidence)
+    pair = search.visited.pop(frozenset(two))
+    told = SimpleNamespace(causes=SimpleNamespace(sets=[SimpleNamespace(effects=(left,))]))
+    search.__dict__["singles"] = told
+    names = {
+        "told": lambda _: told,
+        "_in_twos": lambda: search.visited.update({frozenset(two): pair}),
+        "_visit": lambda *_: None,
+        "_best": lambda _, state: state,
+        "_better": lambda state, _: state,
+        "_settled": lambda told, state: (told, state),
+    }
+    for name, stand_in in names.items():
+        monkeypatch.setattr(search, name, stand_in)
+    assert search.found()[1].put == {"one": imitator, "two": two}[found]
+
+
 def test_an_added_change_is_none_where_it_does_as_well_as_a_lack() -> None:
     """All changes in both drivings the same are a compromise, which says nothing of the added."""
     part, both = ("mass",), ("mass", "cg_position")

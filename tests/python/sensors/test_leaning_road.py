@@ -10,9 +10,9 @@ G = 9.81
 
 def log(rolls: float, leans: float) -> sv.Log:
     """Bends at varying speed: of a body that rolls, on a road with a crossfall that varies."""
-    t = np.arange(0.0, 200.0, 0.02)
+    t = np.arange(0.0, 200.0, 0.04)
     rng = np.random.default_rng(11)
-    noise = rng.standard_normal((5, t.size))
+    noise = rng.standard_normal((5, 2 * t.size))[:, ::2]
     speed = 18.0 + 6.0 * np.sin(0.11 * t) + 2.0 * np.sin(0.31 * t)
     turns = 3.0 * np.sin(0.37 * t) * np.sin(0.053 * t)
     yaw_rate = turns / speed

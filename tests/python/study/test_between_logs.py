@@ -17,9 +17,11 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study.judge import between_logs
 from sysid_vehicle.study.judge.between_logs import no_effect_but_the_log, told_differently
 from sysid_vehicle.study.judge.one_for_all import OneForAll, one_for_all
 from sysid_vehicle.study.results.added import AddedEffect
+from sysid_vehicle.study.search.steps import merit
 
 
 def laps(*cars: Model, duration_s: float = 30.0) -> list[Log]:
@@ -65,6 +67,22 @@ def test_what_an_effect_of_the_log_stands_in_for_is_told(two_sets: Fit) -> None:
     assert effect == ""
     assert said.startswith("tyre_temperature may be what differs between the training logs")
     assert "(cornering stiffness front " in said
+
+
+def test_tyres_of_their_own_have_to_be_worth_their_price(
+    two_sets: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What differs between the logs is there, and explains less than the effect does."""
+    heat = two_sets.model.add("tyre_temperature")
+    final = refine(heat, two_sets.driving, two_sets.noise)
+    apart = between_logs.by_log(two_sets)
+    sums = sum(map(merit, apart))
+    assert between_logs.differing(apart)
+    for ahead, said in ((1.0, False), (-1.0, True)):
+        of = {id(final): sums + ahead, id(two_sets): sums + ahead}
+        monkeypatch.setattr(between_logs, "merit", lambda fit, of=of: of.get(id(fit), merit(fit)))
+        assert (no_effect_but_the_log(two_sets, final, ("tyre_temperature",)) != "") is said
+        assert (told_differently(two_sets) != []) is said
 
 
 def test_an_effect_that_acts_in_each_log_is_none_of_them(start: Model, truth: Model) -> None:
