@@ -15,7 +15,7 @@ from sysid_vehicle.sensors.apply import shifted
 
 MOTION = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 LENGTH = "tyre_relaxation.relaxation_length_m"
-STD_S = 0.001
+STD_S = 0.002
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def model() -> Model:
 
 @pytest.fixture(scope="module")
 def log(model: Model) -> Log:
-    return drive(model, manoeuvres.slalom(), seed=4, rate_hz=50.0)
+    return drive(model, manoeuvres.slalom(), seed=4, rate_hz=25.0)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_a_fit_goes_with_the_time_of_its_readings(model: Model, log: Log, sure: 
     moved = identify(model, earlier(log, STD_S), starts=1)
     place = [e.name for e in fit.estimates].index(LENGTH)
     expected = moved[LENGTH].value - sure[LENGTH].value
-    # At the speed of the slalom 1 ms is about 0.025 m.
+    # At the speed of the slalom 2 ms are about 0.05 m.
     assert abs(expected) > 2.0 * sure[LENGTH].std
     assert fit.pushed[place, 0] == pytest.approx(expected, rel=0.1)
     assert fit[LENGTH].std == pytest.approx(np.hypot(sure[LENGTH].std, expected), rel=0.15)
@@ -55,7 +55,7 @@ def test_a_fit_goes_with_the_time_of_its_readings(model: Model, log: Log, sure: 
 
 
 def test_so_does_a_fit_to_predictions(model: Model) -> None:
-    sweep = drive(model, manoeuvres.sine_sweep(), seed=4, rate_hz=50.0)
+    sweep = drive(model, manoeuvres.sine_sweep(), seed=4, rate_hz=25.0)
     unsure = sweep.corrected({}, (), [Retimed(MOTION, STD_S)])
     fit, without, moved = (
         predicting_ahead(identify(model, log, starts=1))

@@ -80,7 +80,7 @@ def test_the_stiffness_is_that_of_the_car_however_inputs_go_between_samples(
     held: bool, seed: int
 ) -> None:
     logs = lab.TyreLog.from_log(driven(seed, held=held), CAR)
-    fit = lab.identify_tyres(CAR, logs, starts=2, profiles=False)
+    fit = lab.identify_tyres(CAR, logs, starts=1, profiles=False)
     assert fit.inputs_held is held
     assert fit.to_dict()["inputs_held"] is held
     assert ("held until the next" in str(fit)) is held
@@ -122,7 +122,7 @@ def test_logs_of_two_kinds_are_refused() -> None:
 def test_without_a_wheel_force_side_forces_count_once() -> None:
     """The measured acceleration has the side force of turned wheels in it, and the drag."""
     logs = lab.TyreLog.from_log(driven(9, held=False, force=False, turn=0.3), CAR)
-    fit = lab.identify_tyres(CAR, logs, starts=2, profiles=False)
+    fit = lab.identify_tyres(CAR, logs, starts=1, profiles=False)
     assert "drag_area_m2" not in [e.name for e in fit.estimates]
     for axle, tyre in zip(("front", "rear"), TYRES, strict=True):
         found = fit[f"BCD_{axle}"]

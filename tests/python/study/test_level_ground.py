@@ -17,8 +17,8 @@ BANK = {"road_bank.bank_rad": 0.03}
 @pytest.fixture(scope="module")
 def logs() -> tuple[sv.Log, sv.Log]:
     truth = sv.Model(sv.example_vehicle()).add("road_bank").with_values(BANK)
-    lap = sv.drive(truth, sv.manoeuvres.lap(40.0), seed=930421, rate_hz=25.0)
-    course = sv.manoeuvres.handling_course(40.0)
+    lap = sv.drive(truth, sv.manoeuvres.lap(25.0), seed=930421, rate_hz=25.0)
+    course = sv.manoeuvres.handling_course(25.0)
     return lap, sv.drive(truth, course, seed=930422, rate_hz=25.0)
 
 

@@ -13,7 +13,7 @@ NAMES = ("force_gain", "yaw_inertia", "aero_drag")
 
 @pytest.fixture(scope="module")
 def lap(truth: Model) -> Log:
-    return drive(truth, manoeuvres.lap(40.0), seed=1, rate_hz=50.0)
+    return drive(truth, manoeuvres.lap(40.0), seed=1, rate_hz=25.0)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_effects_with_causes_of_their_own_are_no_one_error(start: Model, truth: 
     found = ("aero_drag", "steer_offset")
     hidden = {"aero_drag.drag_area_m2": 0.3, "steer_offset.offset_rad": 0.002}
     log = drive(
-        truth.add(*found).with_values(hidden), manoeuvres.lap(40.0), seed=531006, rate_hz=50.0
+        truth.add(*found).with_values(hidden), manoeuvres.lap(40.0), seed=531006, rate_hz=25.0
     )
     fit = identify(start, log, starts=1)
     final = refine(fit.model.add(*found), fit.driving, fit.noise)
@@ -64,7 +64,7 @@ def test_effects_with_causes_of_their_own_are_no_one_error(start: Model, truth: 
 
 
 def test_a_study_warns_of_it(heavy: Fit, lap: Log, truth: Model) -> None:
-    course = drive(truth, manoeuvres.handling_course(20.0, 7.5), seed=2, rate_hz=50.0)
+    course = drive(truth, manoeuvres.handling_course(20.0, 7.5), seed=2, rate_hz=25.0)
     with pytest.warns(SysidWarning) as caught:
         found = improve(
             heavy.model,
