@@ -1,5 +1,6 @@
 """A model with an added effect is never fitted worse than the model that it contains."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +30,7 @@ def contained(model: sv.Model, precise: sv.Log) -> Fit:
     return sv.identify(model, precise, starts=1)
 
 
-@pytest.mark.parametrize("effect", [e.id for e in sv.catalogue()])
+@pytest.mark.parametrize("effect", LAGS)
 @pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
 def test_an_added_effect_costs_nothing(
     model: sv.Model, precise: sv.Log, contained: Fit, effect: str
@@ -38,15 +39,34 @@ def test_an_added_effect_costs_nothing(
     assert found.log_likelihood > contained.log_likelihood - SAME_OPTIMUM
 
 
-@pytest.mark.parametrize("effect", LAGS)
-def test_a_lag_at_its_smallest_is_as_good_as_none(
+@pytest.mark.parametrize("effect", [e.id for e in sv.catalogue()])
+def test_an_effect_at_nothing_is_as_good_as_none(
     model: sv.Model, contained: Fit, effect: str
 ) -> None:
-    """The search keeps from exactly zero; what that costs has to be next to nothing."""
+    """The search keeps lags from exactly zero; what that costs has to be next to nothing."""
     fit = refine(contained.model.add(effect), contained.driving, contained.noise)
     assert fit.log_likelihood > contained.log_likelihood - SAME_OPTIMUM
     box = free_box(model.add(effect))
-    assert np.all(box.lower[len(model.free_names) :] > 0.0)
+    assert effect not in LAGS or np.all(box.lower[len(model.free_names) :] > 0.0)
+
+
+def test_a_search_that_ends_at_other_tyres_begins_at_those_without_the_effect(
+    model: sv.Model, precise: sv.Log, contained: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The search of the model with the effect ends far below, as it may from the vehicle file."""
+    module = sys.modules["sysid_vehicle.identify.identify"]
+    searched = module._maximised
+    asked: list[tuple[str, ...]] = []
+
+    def astray(of: sv.Model, *rest: object) -> Fit:
+        asked.append(of.effects)
+        found: Fit = searched(of, *rest)
+        return replace(found, log_likelihood=found.log_likelihood - 500.0) if of.effects else found
+
+    monkeypatch.setattr(module, "_maximised", astray)
+    found = sv.identify(model.add("steer_offset"), precise, starts=1)
+    assert asked == [("steer_offset",), ()]
+    assert found.log_likelihood > contained.log_likelihood - SAME_OPTIMUM
 
 
 @pytest.mark.parametrize("which", [0, 2])
