@@ -188,7 +188,7 @@ def test_the_promise_is_that_of_the_size_at_hand(
     car = truth.add("steer_delay").with_values({"steer_delay.delay_s": 0.02})
     log = drive(car, manoeuvres.ramp_steer((18.0, 27.0), 8.0, 4.0), seed=31, rate_hz=50.0)
     fit = identify(start, log, starts=1)
-    asked_of_few(monkeypatch)
+    asked_of_few(monkeypatch, 8)
     found = suggest_manoeuvre(fit, "steer_delay", "steer_lag")
     best = found.best
     assert found.sizes == "at hand"
@@ -211,13 +211,13 @@ def test_what_the_rival_takes_for_a_disturbance_it_takes_for_one_again(
     road = RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
 
     def driven(manoeuvre: manoeuvres.Manoeuvre, seed: int) -> Log:
-        log = drive(car, manoeuvre, seed=seed, disturbance=road, rate_hz=50.0)
+        log = drive(car, manoeuvre, seed=seed, disturbance=road, rate_hz=25.0)
         kept = {c: log[c] for c in log.channels if c != "vy_mps"}
         return Log.from_arrays(kept, name=log.name, check=False)
 
     log = driven(manoeuvres.step_steer((17.0, 27.0), (3.0, 6.0)), 33)
     fit = identify(start, log, starts=1)
-    asked_of_few(monkeypatch)
+    asked_of_few(monkeypatch, 8)
     asked = suggest_manoeuvre(fit, "gyro_bias", "side_wind")
     more = [driven(asked.best.manoeuvre, 34 + i) for i in range(asked.best.times)]
     reached = _reached(start, [log, *more], "gyro_bias", "side_wind")
@@ -379,7 +379,7 @@ def test_what_acts_is_no_disturbance_that_hides_the_difference(
 ) -> None:
     """A drag that the fit lacks, told from rolling resistance by the driving at hand."""
     car = truth.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.3})
-    log = drive(car, manoeuvres.handling_course(30.0, 4.0), seed=4)
+    log = drive(car, manoeuvres.handling_course(30.0, 4.0), seed=4, rate_hz=25.0)
     fit = identify(start, log, starts=1)
     pair = [identify(start.add(e), log, starts=1) for e in ("aero_drag", "rolling_resistance")]
     apart = np.sqrt(2.0 * (pair[0].log_likelihood - pair[1].log_likelihood))

@@ -105,7 +105,7 @@ def test_what_the_driver_knows_of_slopes_is_no_late_sensor(among_hills: Fit) -> 
 
 def test_late_speeds_are_found_where_the_ground_is_level(truth: Model, start: Model) -> None:
     late = truth.add("sensor_delay").with_values({"sensor_delay.speeds_s": 0.12})
-    log = drive(late, manoeuvres.lap(40.0), seed=7, rate_hz=50.0).without("vy_mps")
+    log = drive(late, manoeuvres.lap(40.0), seed=7, rate_hz=25.0).without("vy_mps")
     fit = identify(start, log, starts=1)
     assert fit.noise.road[0] > 0.05  # slopes that are not there take up the delay
     found = diagnose(fit).significant[0]

@@ -150,7 +150,7 @@ def test_of_the_other_motion_what_the_best_explains_is_not_refitted(
 ) -> None:
     car = truth.add("tyre_load_sensitivity")
     car = car.with_values({"tyre_load_sensitivity.sensitivity": 0.25})
-    fit = identify(truth, drive(car, manoeuvres.lap(), seed=1), starts=1)
+    fit = identify(truth, drive(car, manoeuvres.lap(40.0), seed=1, rate_hz=25.0), starts=1)
     some = ["tyre_load_sensitivity", *(e.id for e in catalogue() if e.along_alone)]
 
     def along() -> set[str]:

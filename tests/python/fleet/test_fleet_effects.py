@@ -22,7 +22,7 @@ def main() -> None:
     )
     car = sv.Model(sv.example_vehicle())
     boxed = car.add("roof_box").with_values({"roof_box.gain": 2.0})
-    log = sv.drive(boxed, sv.manoeuvres.lap(15.0), seed=2, rate_hz=50.0)
+    log = sv.drive(boxed, sv.manoeuvres.lap(15.0), seed=2, rate_hz=25.0)
     for _ in range(2):
         fleet = sv.improve_many(
             car, {"monday": log}, out="out", workers=2, candidates=["roof_box", "mass"], starts=1
