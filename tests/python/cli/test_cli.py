@@ -24,8 +24,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A vehicle file and two short logs."""
     path = tmp_path_factory.mktemp("cli")
     TRUTH.vehicle.to_toml(path / "car.toml")
-    train = sv.drive(TRUTH, sv.manoeuvres.lap(25.0), seed=1, rate_hz=50.0)
-    test = sv.drive(TRUTH, sv.manoeuvres.handling_course(20.0), seed=2, rate_hz=50.0)
+    train = sv.drive(TRUTH, sv.manoeuvres.lap(25.0), seed=1, rate_hz=25.0)
+    test = sv.drive(TRUTH, sv.manoeuvres.handling_course(20.0), seed=2, rate_hz=25.0)
     train.to_csv(path / "lap.csv")
     test.to_csv(path / "course.csv")
     return path
@@ -36,8 +36,10 @@ def arguments(folder: Path) -> list[str]:
     return [str(folder / "lap.csv"), "--vehicle", str(folder / "car.toml")]
 
 
+FEW = {"steer_lag", "steer_delay", "tyre_relaxation", "yaw_inertia", "mass", "aero_drag"}
+OTHERS = sorted({e.id for e in sv.catalogue()} - FEW)
 SEARCH = [
-    *("--exclude", "rear_toe, gyro_bias", "--max-effects", "3", "--time-limit", "1e4"),
+    *("--exclude", ", ".join(OTHERS), "--max-effects", "3", "--time-limit", "1e4"),
     *("--matters", "yaw_rate=0.5deg/s, vy=0.1"),
 ]
 
@@ -115,7 +117,7 @@ def test_improve_finds_the_effect_and_writes_json_and_report(
     assert found["error_after"] < found["error_before"]
     first = result["ranking"][0]  # half a minute of a lap hardly tells a lag from a delay
     assert "steer_lag" in {first["id"], *first["indistinguishable_from"]}
-    assert not {"rear_toe", "gyro_bias"} & {c["id"] for c in result["ranking"]}
+    assert {c["id"] for c in result["ranking"]} == FEW
     assert set(result["horizons"]["channels"]) >= {"vy_mps", "yaw_rate_radps", "ay_mps2"}
     assert 0.5 < result["explained"]["share"] <= 1.0
     assert 0.0 < result["explained"]["low"] < result["explained"]["share"]
@@ -291,7 +293,7 @@ def test_a_log_that_breaks_in_the_middle_leaves_no_output(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lines = (folder / "lap.csv").read_text(encoding="utf-8").splitlines()
-    lines[700] = lines[700].replace(lines[700].split(",")[0], "zero", 1)
+    lines[400] = lines[400].replace(lines[400].split(",")[0], "zero", 1)
     log = tmp_path / "broken.csv"
     log.write_text("\n".join(lines), encoding="utf-8")
     out = tmp_path / "out.json"
