@@ -1,11 +1,9 @@
 """Two changes at once: what imitates both is likelier than either, and is not what changed."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-from sysid_vehicle import Change, Fit, Model, SensorNoise, changed, drive, identify, manoeuvres
+from sysid_vehicle import Change, Fit, Log, Model, SensorNoise, changed, drive, identify, manoeuvres
 from sysid_vehicle.diagnose.change.both_axles import FRICTION, STIFFNESS
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
@@ -13,20 +11,30 @@ from sysid_vehicle.diagnose.changed import _later
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
 
+LAP, COURSE = manoeuvres.lap(12.0), manoeuvres.handling_course(10.0, lateral_mps2=7.5)
+
+
+def driven(car: Model, course: manoeuvres.Manoeuvre, seed: int, rate_hz: float = 25.0) -> Log:
+    """Short driving by quiet sensors, that tells as much as longer driving by usual ones."""
+    quiet = SensorNoise().scaled(0.7)
+    return drive(car, course, seed=seed, rate_hz=rate_hz, noise=quiet)
+
+
+@pytest.fixture(scope="module")
+def before(start: Model, truth: Model) -> Fit:
+    return identify(start, driven(truth, LAP, 1), starts=1)
+
 
 def told(
     before: Fit,
     truth: Model,
     values: dict[str, float],
     candidates: tuple[str, ...],
-    seconds: float = 15.0,
-    **driven: Any,
+    rate_hz: float = 25.0,
 ) -> Change:
     effects = {n.split(".")[0] for n in values if "." in n}
     car = truth.add(*sorted(effects - {*truth.effects})).with_values(values)
-    course = manoeuvres.handling_course(seconds, lateral_mps2=7.5)
-    later = drive(car, course, seed=42, **{"rate_hz": 25.0, **driven})
-    return changed(before, later, candidates=candidates)
+    return changed(before, driven(car, COURSE, 42, rate_hz), candidates=candidates)
 
 
 def softer(truth: Model, letter: str, front: float, rear: float) -> dict[str, float]:
@@ -74,7 +82,7 @@ def test_tyres_of_each_axle_are_both_and_one_of_them(before: Fit, truth: Model) 
 def test_what_is_beside_its_rival_is_as_large_as_in_its_place(before: Fit, truth: Model) -> None:
     """Beside the other tyres that are put in it would be nothing."""
     car = truth.with_values(softer(truth, "B", 0.85, 0.76))
-    later = drive(car, manoeuvres.handling_course(15.0, lateral_mps2=7.5), seed=42, rate_hz=25.0)
+    later = driven(car, COURSE, 42)
     said = Saying(Search(before, _later(before, Driving.of(later), None), ("mass",), USUAL))
     change = said.change()
     (axle,) = {e.id for e in change.named if e.id.startswith("tyre_")} - {*said.state.put}
@@ -90,12 +98,10 @@ def test_what_is_beside_its_rival_is_as_large_as_in_its_place(before: Fit, truth
 
 def test_a_change_that_no_effect_explains_is_told_where_it_acts(start: Model, truth: Model) -> None:
     """A drag that may not have changed, beside a steering that was set otherwise: along the car."""
-    # At 25 Hz, or by usual sensors in so short a time, a force is not told from a drifting speed.
-    quiet: dict[str, Any] = {"rate_hz": 50.0, "noise": SensorNoise().scaled(0.7)}
-    lap = drive(truth, manoeuvres.lap(12.0), seed=1, **quiet)
-    before = identify(start, lap, starts=1)
+    # Half as many samples do not tell a force from a speed that drifts.
+    before = identify(start, driven(truth, LAP, 1, 50.0), starts=1)
     values = {"aero_drag.drag_area_m2": 0.6, "steer_offset.offset_rad": 0.006}
-    change = told(before, truth, values, ("steer_offset",), 10.0, **quiet)
+    change = told(before, truth, values, ("steer_offset",), 50.0)
     # No tyres, which gained thousands of nats by what the drag does.
     assert [e.id for e in change.named] == ["steer_offset"]
     offset = change["steer_offset"]
