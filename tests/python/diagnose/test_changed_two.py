@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from changed_drives import later
 
 from sysid_vehicle import Change, Fit, Log, Model, SensorNoise, changed, drive, identify, manoeuvres
 from sysid_vehicle.diagnose.change.both_axles import FRICTION, STIFFNESS
@@ -21,7 +22,7 @@ def driven(car: Model, course: manoeuvres.Manoeuvre, seed: int, rate_hz: float =
 
 
 @pytest.fixture(scope="module")
-def before(start: Model, truth: Model) -> Fit:
+def short(start: Model, truth: Model) -> Fit:
     return identify(start, driven(truth, LAP, 1), starts=1)
 
 
@@ -45,7 +46,7 @@ def softer(truth: Model, letter: str, front: float, rear: float) -> dict[str, fl
 def test_drag_and_mass_are_no_force_gain(before: Fit, truth: Model) -> None:
     values = {"aero_drag.drag_area_m2": 0.3, "mass.relative_error": 0.13}
     few = ("mass", "aero_drag", "force_gain", "wheel_inertia", "rolling_resistance")
-    change = told(before, truth, values, few)
+    change = changed(before, later(truth, **values), candidates=few)
     assert {e.id for e in change.named} == {"mass", "aero_drag"}
     assert all(e.group == () for e in change.named)
     for name, size in values.items():
@@ -56,7 +57,7 @@ def test_drag_and_mass_are_no_force_gain(before: Fit, truth: Model) -> None:
 def test_less_grip_and_more_mass_are_no_tyres_of_each_axle(before: Fit, truth: Model) -> None:
     values = softer(truth, "D", 0.82, 0.82) | {"mass.relative_error": 0.09}
     few = ("mass", "force_gain", "lateral_load_transfer", "wheel_inertia", "aero_downforce")
-    change = told(before, truth, values, few)
+    change = changed(before, later(truth, **values), candidates=few)
     assert {e.id for e in change.named} == {FRICTION, STIFFNESS, "mass"}
     assert change[FRICTION].value[0] == pytest.approx(-0.18, abs=0.01)
     assert change[STIFFNESS].value[0] == pytest.approx(-0.18, abs=0.01)
@@ -65,7 +66,8 @@ def test_less_grip_and_more_mass_are_no_tyres_of_each_axle(before: Fit, truth: M
 
 def test_tyres_of_each_axle_are_both_and_one_of_them(before: Fit, truth: Model) -> None:
     """The same car by other names: none is named with certainty, and the headline has both."""
-    change = told(before, truth, softer(truth, "B", 0.85, 0.76), ("steer_ratio",))
+    worn = later(truth, **softer(truth, "B", 0.85, 0.76))
+    change = changed(before, worn, candidates=("steer_ratio",))
     named = {e.id: e for e in change.named}
     assert {"tyre_front", "tyre_rear"} <= {*named, *(g for e in named.values() for g in e.group)}
     assert all(e.group for e in named.values())
@@ -79,17 +81,17 @@ def test_tyres_of_each_axle_are_both_and_one_of_them(before: Fit, truth: Model) 
         assert own * (1.0 + sizes.get(STIFFNESS, 0.0)) == pytest.approx(factor, abs=0.02)
 
 
-def test_what_is_beside_its_rival_is_as_large_as_in_its_place(before: Fit, truth: Model) -> None:
+def test_what_is_beside_its_rival_is_as_large_as_in_its_place(short: Fit, truth: Model) -> None:
     """Beside the other tyres that are put in it would be nothing."""
     car = truth.with_values(softer(truth, "B", 0.85, 0.76))
-    later = driven(car, COURSE, 42)
-    said = Saying(Search(before, _later(before, Driving.of(later), None), ("mass",), USUAL))
+    after = Driving.of(driven(car, COURSE, 42))
+    said = Saying(Search(short, _later(short, after, None), ("mass",), USUAL))
     change = said.change()
     (axle,) = {e.id for e in change.named if e.id.startswith("tyre_")} - {*said.state.put}
     share, std = change[axle].stiffness or (0.0, np.inf)
     state, _ = said._places[axle]
     assert axle in state.put
-    model, reference = state.searched, before.model
+    model, reference = state.searched, short.model
     names = [f"{letter}_{axle.removeprefix('tyre_')}" for letter in "BCD"]
     fitted = np.prod([model.value(n) for n in names]) / np.prod([reference.value(n) for n in names])
     assert share == pytest.approx(fitted - 1.0, abs=0.02)
@@ -109,12 +111,10 @@ def test_a_change_that_no_effect_explains_is_told_where_it_acts(start: Model, tr
     assert [s.effects for s in change.unknown] == [("unknown F_x",)]
 
 
-def test_what_no_effect_explains_is_told_beside_what_acts_like_it(
-    before: Fit, truth: Model
-) -> None:
+def test_what_no_effect_explains_is_told_beside_what_acts_like_it(short: Fit, truth: Model) -> None:
     """A yaw moment has shapes that are like any effect: it is told where it is there beside it."""
     values = {"side_wind.yaw_moment_nm": 300.0, "mass.relative_error": 0.1}
-    change = told(before, truth, values, ("mass", "steer_ratio"))
+    change = told(short, truth, values, ("mass", "steer_ratio"))
     assert [e.id for e in change.named] == ["mass"]
     assert change["mass"].value[0] == pytest.approx(0.1, abs=3.0 * change["mass"].std[0])
     assert [s.effects for s in change.unknown] == [("unknown M_z",)]
