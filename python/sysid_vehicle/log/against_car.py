@@ -50,11 +50,15 @@ _LEFT, _UNEXPLAINED, _INCOHERENT = 4.0, 0.05, 0.7
 _TINY = 1e-12
 _NEAR = 0.2  # a unit is named where the factor is so near, as a logarithm
 
+_WEIGHT = (
+    "fx_n seems to be in kilograms: put factor = 9.80665 for it in the channel map; or mass_kg "
+    "seems to be a weight in newtons: multiply it by 0.102"
+)
 _MASS_SLIPS = (
     (1.0 / 0.45359237, "mass_kg seems to be in pounds: multiply it by 0.4536"),
     (1e-3, "mass_kg seems to be in tonnes: multiply it by 1000"),
     (4.4482216, "fx_n seems to be in pounds: put factor = 4.448222 for it in the channel map"),
-    (GRAVITY_MPS2, "fx_n seems to be in kilograms: put factor = 9.80665 for it in the channel map"),
+    (GRAVITY_MPS2, _WEIGHT),
     (0.1, "fx_n seems to be ten times too large: put factor = 0.1 for it in the channel map"),
 )
 _LENGTH_SLIPS = (

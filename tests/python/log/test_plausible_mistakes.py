@@ -73,6 +73,11 @@ CARS: dict[str, tuple[Callable[[Columns], None], dict[str, float | None], list[s
         {"mass_kg": 1250.0 / 0.45359237},
         ["mass_kg = 2755.78", "pounds", "0.4536"],
     ),
+    "mass as a weight in newtons": (
+        lambda data: None,
+        {"mass_kg": 1250.0 * 9.80665, "yaw_inertia_kgm2": None},
+        ["or mass_kg seems to be a weight in newtons: multiply it by 0.102"],
+    ),
     "force in pounds": (times(fx_n=1 / 4.4482216), {}, ["fx_n seems to be in pounds", "4.448222"]),
     "steering ratio of 5 for 16": (
         times(steer_rad=16.0 / 5.0),

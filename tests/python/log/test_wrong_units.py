@@ -25,6 +25,18 @@ WRONG: dict[str, tuple[Change, list[str]]] = {
         times(vx_mps=60.0 / (2.0 * np.pi * 0.32)),
         ["seems to be in rpm of a wheel, or ay", "0.1047198 times the radius of the tyre"],
     ),
+    "vx in mph, ay in g": (
+        times(vx_mps=1 / 0.44704, ay_mps2=1 / G),
+        ["ay_mps2: seems to be in g and vx_mps: seems to be in miles per hour: ay_mps2 /"],
+    ),
+    "vx in knots, ay in g": (
+        times(vx_mps=1 / 0.514444, ay_mps2=1 / G),
+        ["g and vx_mps: seems to be in knots, or", "9.80665 for ay_mps2 and factor = 0.5144444"],
+    ),
+    "vx in rpm of a lorry's wheels": (
+        times(vx_mps=60.0 / (2.0 * np.pi * 0.48)),
+        ["vx_mps: seems to be in rpm of a wheel, or", "0.1047198 times the radius of the tyre"],
+    ),
     "vx in mm/s": (times(vx_mps=1e3), ["vx_mps: ", "if it is in mm/s, put factor = 0.001 in"]),
     "vx in cm/s": (times(vx_mps=1e2), ["vx_mps: ", "if it is in cm/s, put factor = 0.01 in"]),
     "ay in ft/s2": (

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray
 from ...errors import InvalidInput
+from ...vehicle import GRAVITY_MPS2
 from .motion import Motion
 from .regression import Regression, regress, size_of
 
@@ -34,6 +35,7 @@ Slipped = tuple[float, tuple[Slip, ...]]
 # What is named where it explains the coefficient best, and what else looks so; that is named beside
 # it where it is nearer.
 Slips = tuple[Slipped | tuple[float, tuple[Slip, ...], tuple[Slipped, ...]], ...]
+AY_G: Slip = ("ay_mps2", "g", "factor = 9.80665")
 VX_KMH: Slip = ("vx_mps", "km/h", "factor = 0.2777778")
 VX_MPH: Slip = ("vx_mps", "miles per hour", "factor = 0.44704")
 _VX_KNOTS: Slip = ("vx_mps", "knots", "factor = 0.5144444")
@@ -43,10 +45,15 @@ _TOGETHER = 0.5  # cosine
 _RADIUS_M = 0.31  # of a usual car's tyre
 _RPM = 2.0 * math.pi / 60.0
 _VX_RPM: Slip = ("vx_mps", "rpm of a wheel", "factor = 0.1047198 times the radius of the tyre [m]")
-# Beside km/h, beside miles per hour, and beside an acceleration in g and a speed in km/h.
+_LORRY_RADIUS_M = 0.48
+# Beside km/h, beside miles per hour, and beside an acceleration in g and a speed in either.
 LIKE_KMH: tuple[Slipped, ...] = ((0.3048, (_VX_FEET,)), (_RADIUS_M, (_VX_WHEEL,)))
 LIKE_MPH: tuple[Slipped, ...] = ((0.5144444, (_VX_KNOTS,)),)
 LIKE_G_KMH: tuple[Slipped, ...] = ((_RPM * _RADIUS_M, (_VX_RPM,)),)
+LIKE_G_MPH: tuple[Slipped, ...] = (
+    (0.5144444 / GRAVITY_MPS2, (AY_G, _VX_KNOTS)),
+    (_RPM * _LORRY_RADIUS_M, (_VX_RPM,)),
+)
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,12 @@ from .bank import leans_deg, wanders_deg
 from .clock import clock_notes
 from .lags import lag_notes
 from .laws import (
+    AY_G,
     CLEARLY,
     EXCITED,
     LATERAL,
     LIKE_G_KMH,
+    LIKE_G_MPH,
     LIKE_KMH,
     LIKE_MPH,
     MIN_WINDOWS,
@@ -71,7 +73,6 @@ _SLIDE_STD = 0.35
 _YAW_DEG = ("yaw_rate_radps", "degrees per second", f"factor = {DEG}")
 _YAW_RPM = ("yaw_rate_radps", "rpm", "factor = 0.1047198")
 _YAW_TURNS = ("yaw_rate_radps", "turns per second", "factor = 6.283185")
-_AY_G = ("ay_mps2", "g", "factor = 9.80665")
 _AY_FEET = ("ay_mps2", "ft/s2", "factor = 0.3048")
 _VY_KMH = ("vy_mps", "km/h", "factor = 0.2777778")
 _VY_MPH = ("vy_mps", "miles per hour", "factor = 0.44704")
@@ -81,15 +82,16 @@ _RAD, _G = math.pi / 180.0, GRAVITY_MPS2
 
 _LATERAL_SLIPS: Slips = (
     (_RAD, (_YAW_DEG,)),
-    (1.0 / _G, (_AY_G,), ((math.pi / 30.0, (_YAW_RPM,)),)),
+    (1.0 / _G, (AY_G,), ((math.pi / 30.0, (_YAW_RPM,)),)),
     (1.0 / 0.3048, (_AY_FEET,)),
     (2.0 * math.pi, (_YAW_TURNS,)),
     (1.0 / 3.6, (VX_KMH,), LIKE_KMH),
     (0.44704, (VX_MPH,), LIKE_MPH),
-    (_RAD / _G, (_YAW_DEG, _AY_G)),
+    (_RAD / _G, (_YAW_DEG, AY_G)),
     (_RAD / 3.6, (_YAW_DEG, VX_KMH)),
-    (1.0 / _G / 3.6, (_AY_G, VX_KMH), LIKE_G_KMH),
-    (_RAD / _G / 3.6, (_YAW_DEG, _AY_G, VX_KMH)),
+    (1.0 / _G / 3.6, (AY_G, VX_KMH), LIKE_G_KMH),
+    (_RAD / _G / 3.6, (_YAW_DEG, AY_G, VX_KMH)),
+    (0.44704 / _G, (AY_G, VX_MPH), LIKE_G_MPH),
 )
 _SLIDING_SLIPS: Slips = (
     (SPEED_UNITS["km/h"], (_VY_KMH,), ((SPEED_UNITS["ft/s"], (_VY_FEET,)),)),
